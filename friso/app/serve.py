@@ -118,9 +118,9 @@ class Server(uvicorn.Server):
         await super().startup(sockets)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End the questions, then the connections.
+        """Stop the questions that are being computed, then close the connections.
 
-        An upload that is still coming is cut off, which is no error.
+        An upload in progress is cut off; this is not logged as an error.
         """
         self.workshop.overtake()
         errors = logging.getLogger("uvicorn.error")

@@ -53,7 +53,7 @@ class Work:
     """Messages logged early; most answers repeat them."""
 
     def overtake(self) -> None:
-        """End the work from another thread."""
+        """Ask this question to stop; safe to call from another thread."""
         self.flag[0] = 1
 
     def progress(self, done: int, total: int, label: str, /) -> None:

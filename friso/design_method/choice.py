@@ -77,7 +77,10 @@ def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | No
 
 
 def stays(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Tell whether the cart also stays stuck inside the stroke by the beam model."""
+    """Tell whether the beam model confirms that friction holds the cart over the whole stroke.
+
+    The force of the leaves at the end of the stroke, with its safety factor and tolerance, is at most the friction.
+    """
     safety = task.spec.safety
     return bool(safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction)
 

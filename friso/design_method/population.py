@@ -71,10 +71,10 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
 
 
 def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
-    """Draw machines and moves evenly from all ranges.
+    """Draw machines and moves at random (Sobol) from the ranges of the specification.
 
-    Friction, masses, stiffness, travel and acceleration vary; travel and acceleration evenly in the logarithm.
-    Stiffness varies by its tolerance, and falls by up to the share `softening` that the load may take.
+    Friction, masses and stiffness are uniform; travel and acceleration are uniform in the logarithm. Stiffness varies
+    by its tolerance; its low end is also reduced by `softening`, the fraction that the load may take away.
     """
     settings = DesignSettings.current()
     ranges = _friction(spec, flat) | _masses(spec)

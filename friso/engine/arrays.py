@@ -25,16 +25,16 @@ NO_TABLES = Tables(np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 0, 2)), n
 
 
 class Batch(NamedTuple):
-    """Inputs of the runs of one model; the first dimension may also be 1, shared by all runs.
+    """Inputs of a batch of n runs of one model; a first dimension of 1 is shared by all runs.
 
-    - Constants (n, constants), start states, and absolute tolerances (n, states). Start states are followed by the
-      numbers that are held.
-    - Modes (n, kinks); first and longest steps [s] (n,).
-    - Pieces of the reference (n, pieces + 1, 1 + inputs); the last only ends the run.
-    - The number of the piece with which the window for extremes begins (n,).
-    - The period and the lateness of the drive's clock [s] (n, 2).
-    - The smallest swing [m] between two turning points that are kept (n,).
-    - The tables that a drive looks up.
+    - Constants (n, constants); initial states, and absolute tolerances (n, states). Initial states are followed by the
+      values that a sampled controller holds between samples.
+    - Initial modes, one for each kink of the equations (n, kinks); first and longest steps [s] (n,).
+    - Pieces of the reference (n, pieces + 1, 1 + inputs); the last one only marks the end of the run.
+    - Index of the piece at which the window for extremes opens (n,).
+    - Sample time of the drive, and delay from a sample to its effect [s] (n, 2).
+    - Smallest swing [m] between two turning points for them to be recorded (n,).
+    - Lookup tables of the drive.
     """
 
     constants: np.ndarray

@@ -85,7 +85,10 @@ def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -
 
 
 def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
-    """Return the rows of pieces that begin a time [s] later, and go on as these do."""
+    """Return the pieces of the reference restarted a time [s] later, with the same course.
+
+    Polynomials are expanded about the new start, and sines get the phase and frequency that they have there.
+    """
     later = rows.copy()
     later[..., 0] += elapsed
     bare = ReferenceForm(form.degree)

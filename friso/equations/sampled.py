@@ -87,7 +87,10 @@ class _Integral:
     due: Any
 
     def when_due(self, value: Any, otherwise: Any = 0) -> Any:
-        """Return a value where the loop of the integrator is due."""
+        """Return `value` at samples where the integrator's loop runs, and `otherwise` at the rest.
+
+        Without a condition (`due` is None), the loop runs at every sample, and it is always `value`.
+        """
         return value if self.due is None else Piecewise((value, self.due), (otherwise, True))
 
 

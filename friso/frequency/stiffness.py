@@ -13,9 +13,9 @@ def in_series(first: Any, second: Any) -> Any:
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with limiter and joint in series, as one whose limiter is not touched.
+    """Return the stage with its joint replaced by joint and limiter in series, never touching.
 
-    Table 1 of the thesis prints a touched limiter so.
+    Stiffness and damping are k1 k2 / (k1 + k2). Table 1 of the thesis gives a limiter in contact in this way.
     """
     pairs = {"stiffness": "limiter_stiffness", "damping": "limiter_damping"}
     free = {"joint.stroke": 1.0}  # however long: it is not touched

@@ -36,13 +36,19 @@ def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
 
 
 def may_run_away(stages: Ensemble) -> np.ndarray:
-    """Return which stages may have swings that grow far beyond such a limit, shape (count,)."""
+    """Tell which stages may run away beyond a force limit without anti-windup, shape (count,).
+
+    Their loop at lower gains is unstable or unknown. None of them does without such a limit.
+    """
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far != "stable"
 
 
 def surely_run_away(stages: Ensemble) -> np.ndarray:
-    """Return which stages surely have swings that grow far beyond such a limit, shape (count,)."""
+    """Tell which stages surely run away beyond a force limit without anti-windup, shape (count,).
+
+    Their loop at lower gains is unstable. None of them does without such a limit.
+    """
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far == "unstable"
 

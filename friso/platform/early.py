@@ -44,9 +44,9 @@ def _note(number: int, frame: FrameType | None) -> None:
 
 
 def _ignore() -> None:
-    """Ignore signals from now on.
+    """Ignore signals from now on, at the end of a command.
 
-    When Python removes its handlers they would end a command that is done.
+    Python removes its handlers as it exits, and a signal after that would kill a command that has finished.
     """
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)

@@ -265,9 +265,9 @@ else:
 
 
 def once_free(use: Callable[[], _T]) -> _T:
-    """Call `use` and return its result, waiting while another program holds the file.
+    """Call `use`, and retry while another program may hold the file that it needs.
 
-    It waits for up to `PATIENCE`. Raises the error of `use`.
+    Retries for up to `PATIENCE`, then raises the last OSError. Other errors are raised at once.
     """
     end = time.monotonic() + PATIENCE
     while True:

@@ -63,10 +63,7 @@ class MoveRange:
         return cls(float(stated.smallest), float(stated.largest), accelerations)
 
     def check(self, stage: Stage) -> None:
-        """Check that the motion of a stage leaves time for the largest move with the least acceleration.
-
-        Raises InputError.
-        """
+        """Raise InputError unless the motion has time for the largest move at the lowest acceleration."""
         flat = stage.flat()
         slow = {ACCELERATION: self.accelerations[0]} if self.accelerations and ACCELERATION in flat else {}
         moved = {**flat, **slow}

@@ -129,10 +129,10 @@ class Sensitivities:
 def sensitivity(
     stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None, within: float | None = None
 ) -> Sensitivities:
-    """Return derivatives of cycle, edge of hunting and modulus margin to `keys` of a `stage`.
+    """Return derivatives of hunting cycle, edge of hunting and modulus margin to `keys`.
 
-    Without `keys`, all that the equations contain are taken. The `edge` is located, unless that of a check is given.
-    With `within` [m], the deviation that counts as in position, the settling time is derived, too.
+    Without `keys`, all keys in the equations are taken. The `edge` is computed unless that of a check is passed. With
+    `within` [m], the deviation that counts as in position, the settling time is differentiated as well.
 
     Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
     with saltation at kinks. Only the part by which keys move the start of a move is by central differences.
@@ -141,8 +141,8 @@ def sensitivity(
     their own change is taken by central differences. Derivatives of the margin are central differences of the loop at
     one frequency.
 
-    Raises InputError for an unknown key, and for a deviation that is not positive. For the settling time, it is also
-    raised for keys of the motion, since the reference is taken as it is. The start of a release is allowed.
+    Raises InputError for an unknown key, for one whose value is 0 (keys change by fractions), and for a deviation that
+    is not positive. With `within`, also for keys of the motion, except the start of a release.
 
     Examples
     --------

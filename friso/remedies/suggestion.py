@@ -74,7 +74,10 @@ def suggestion(stage: Stage) -> Suggestion | None:
 
 
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
-    """Return the shares of a joint's ranges for a stroke [m] and a damping ratio."""
+    """Return where stroke [m], force and damping ratio lie in the ranges of a joint remedy.
+
+    0 is the low end, 1 the high end, on a logarithmic scale. The force is `RemedySettings.suggested_force`.
+    """
     settings = RemedySettings.current()
     wanted = (stroke, settings.suggested_force, damping)
     return [

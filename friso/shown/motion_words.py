@@ -63,9 +63,9 @@ def _settling(dwell: Dwell) -> str:
 
 
 def motion_sentences(stage: Stage) -> list[str]:
-    """Say which peaks the moves of a stage are too short to reach.
+    """Say if the reference begins with a jump, and which motion limits short moves do not reach.
 
-    Also say that a moving reference begins with a jump; nothing otherwise.
+    Empty if neither applies.
     """
     flat, kind = stage.flat(), axis_shown()
     jump = float(reference(flat, np.zeros(1))[0]) - float(initial_displacement(flat))

@@ -203,7 +203,10 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Tell whether any cycle attracts on both sides of a place, and none is in doubt there."""
+    """Tell whether one branch of cycles attracts just below and just above a value of the swept key.
+
+    False where a branch is in doubt at this value.
+    """
     if result.in_doubt(np.array([place]))[0]:
         return False
     pairs = [pair for branch in result.branches for pair in pairwise(branch.points)]

@@ -21,7 +21,7 @@ NEAR = 1e-6
 
 @dataclass(frozen=True)
 class Levels:
-    """Steady friction over speed: a Stribeck curve (see `StribeckSection`)."""
+    """Parameters of steady friction against velocity: a Stribeck curve (see `StribeckSection`)."""
 
     static: float
     coulomb: float

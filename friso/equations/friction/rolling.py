@@ -73,7 +73,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """From rest as Dahl's exponent has it."""
+        """Return friction against displacement from rest on a virgin curve, by Dahl's exponent."""
         static, stiffness, i = (
             flat[f"friction.{name}"] for name in ("static", "bristle_stiffness", "rolling_exponent")
         )

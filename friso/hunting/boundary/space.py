@@ -119,7 +119,10 @@ class Space:
         """
 
         def length(place: float) -> float:
-            """Return the length at a place on the line."""
+            """Return the distance along the line from `place` over which a key changes by a hundredth.
+
+            The key that changes fastest counts.
+            """
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)
             return min(swept.hundredth(float(at)) / abs(float(way)) for swept, at, way in steps if way)
 

@@ -15,10 +15,10 @@ from friso.hunting.cycle.swings import swings
 
 @dataclass(frozen=True)
 class ReturnMap:
-    """Return map of each stage on one side, shape (count, points).
+    """Return map of each stage from one side of the reference, shape (count, points).
 
-    `distances` [m], ascending, are where the stage sticks. `returns` [m] are how far it swings to the other side:
-    negative if it stops before, 0 if it does not break away. `times` [s] are when.
+    `distances` [m], ascending, are where the stage sticks at first. `returns` [m] are how far on the other side it
+    sticks next: negative if it stops short, 0 if it does not break away. `times` [s] are how long it takes.
     """
 
     distances: np.ndarray

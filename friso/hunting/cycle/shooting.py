@@ -18,10 +18,11 @@ from friso.hunting.settings import ToleranceSettings
 
 @dataclass(frozen=True)
 class Shot:
-    """Result of following orbits from states (count, states) over times [s] (count,).
+    """Result of integrating orbits from initial states (count, states) over times [s] (count,).
 
-    `ends` are the final states, mirrored after half a period. `flows` (count, states, states) are their derivatives by
-    the starts. `high` and `low` [m] (count,) are the extremes of the position. `done` marks completed runs.
+    `ends` are the final states, mirrored after half a period. `flows` (count, states, states) are their derivatives
+    with respect to the initial states. `high` and `low` [m] (count,) are the extremes of position. `done` marks
+    completed runs.
     """
 
     ends: np.ndarray
@@ -275,7 +276,11 @@ class _Shooting:
 
 
 class _Following(_Shooting):
-    """Orbits that are closed while their stages change along lines."""
+    """Periodic orbits followed by continuation, while the keys of their stages vary along lines.
+
+    Newton steps solve for the state, the period and the place on the line together. The Jacobian is updated by
+    Broyden's method.
+    """
 
     border: Border
 

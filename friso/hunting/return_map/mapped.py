@@ -94,7 +94,10 @@ class Mapped:
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
-        """Add runs that go on from the last landings of the runs with these numbers."""
+        """Continue the runs with these indices from their last landing, for up to `most` landings.
+
+        Returns a new sampling that contains the old and the continued runs.
+        """
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
         continued = self.continued.copy()

@@ -9,7 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReturnMapSettings(Settings):
-    """Settings of return maps: landings of a stage by distance, and their prediction."""
+    """Settings of return maps, which predict where a stage sticks next from where it stuck last."""
 
     hardly_attracting_share: float = setting(0.95, "")
     """With more of a deviation left per repetition, 51 of 149 sketched attractors did not attract."""

@@ -166,11 +166,11 @@ def _evened(name: str, raw: Track) -> Track:
 
 
 def _rounded(raw: Track, even: np.ndarray) -> float:
-    """Return the digit [s] to which the stamps of an even clock, (n,) [s], seem rounded.
+    """Estimate the resolution [s] to which the time stamps of an evenly running clock are rounded.
 
-    Between neighbours such a clock has one of two whole numbers of digits, and no stamp deviates by more than a digit,
-    half of which is for the clock's offset and rate, which are estimated from the stamps too. Returns 0 if they
-    scatter otherwise.
+    The steps of such a clock take two values only, one resolution apart. No stamp deviates from `even` (n,) [s] by more
+    than one resolution: half for the rounding, half for the error of the estimated offset and rate. Returns 0 if the
+    stamps scatter in another way.
     """
     settings = LogSettings.current()
     bridges = raw.bridged[1:] | raw.bridged[:-1]

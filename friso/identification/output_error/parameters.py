@@ -49,9 +49,9 @@ class FitParameter:
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the least and largest length [m] that bristles bend before they slip.
+    """Return bounds of the pre-sliding displacement for the fit [m], or [rad] on a rotary axis.
 
-    They are angles [rad] on a rotary axis.
+    Angles follow from the smallest and largest bearing radii.
     """
     settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:

@@ -235,7 +235,10 @@ def _direction(
 
 
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
-    """Bound Coulomb and viscous friction at one speed, where they go together."""
+    """Bound Coulomb and viscous friction if all speeds are about equal and cannot separate them.
+
+    Each one is at most the whole friction force. `spent` is the number of degrees of freedom already used.
+    """
     count = len(friction)
     half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
     top = float(friction.mean()) + half

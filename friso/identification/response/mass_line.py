@@ -227,9 +227,9 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
 
 
 def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a line to levels, straight, or bent if an F-test at 1 % asks for it.
+    """Fit a constant to levels, or a constant plus one of the `shapes` if an F-test (1 %) needs it.
 
-    Returns its columns (lines, 1 or 2) and coefficients.
+    Returns the columns of the fit (spectral lines, 1 or 2), and their coefficients.
     """
     ones = np.ones((len(level), 1))
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])

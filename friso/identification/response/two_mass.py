@@ -187,9 +187,10 @@ def _best(
     outside: tuple[np.ndarray, np.ndarray],
     held: Mapping[int, tuple[float, float]],
 ) -> ResponseFit:
-    """Fit two masses from several starts until one fit explains the data; return the best fit.
+    """Fit a two-mass model from several starts; stop at the first good fit, else take the best.
 
-    Starts are the most promising mass ratio, the modes `seen`, and the next ratio.
+    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside`
+    bounds the parameters beyond the masses, and `held` keeps some near a value.
     """
     settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])

@@ -99,9 +99,9 @@ def _swings(item: ShownCase) -> Array:
 
 
 def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
-    """Return marks of the cycles by their two turning points, by attracting and repelling.
+    """Return markers of the cycles at their two turning points, attracting ones apart from others.
 
-    For a stage that is its own mirror image, the mirror images are marked, too.
+    If a cycle is symmetric, mirror images are marked as well.
     """
     mirrored = any(cycle.symmetric for cycle in cycles)
     markers = []

@@ -179,7 +179,10 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
 
 
 def _verdict(verdict: LawVerdict, case: str) -> str:
-    """Write the verdicts under a law, and whether they are certain."""
+    """Write the verdict on a case by one friction law, or several joined by "or".
+
+    "(not certain)" is added where it applies.
+    """
     return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
 
 

@@ -262,7 +262,7 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
 
 
 def _chosen(identification: Identification) -> list[str]:
-    """Say that a verdict would rest on a controller that friso chose, if it does."""
+    """Warn that the controller in the stage file is friso's choice; empty if it is the user's."""
     table = "controller"
     sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
     if identification.stage is None or sources != {CHOSEN}:

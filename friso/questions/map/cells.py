@@ -130,7 +130,7 @@ def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
 
 
 def cuts(runs: xr.Dataset) -> list[str]:
-    """Return the values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
+    """List the keys fixed in this slice of a larger map, with their values: "Crossover 8 Hz"."""
     fixed = runs.coords.to_dataset()
     return [_gridded(fixed.expand_dims(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
 
@@ -230,8 +230,9 @@ def coloured(runs: xr.Dataset) -> list[str]:
 def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
-    A count of 0 has the colour of rest. Positive numbers over more than three decades get a logarithmic scale of at
-    most six decades. Below that, the motion of a stage at rest is only solver noise.
+    Limits that a metric defines are taken as they are. Counts get one colour each, 0 that of a stage at rest. Numbers
+    that span more than three decades get a logarithmic scale of at most six: anything smaller is solver noise of a
+    stage at rest.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:

@@ -90,7 +90,10 @@ def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
 
 
 def _shown(tuning: Advice) -> list[RemedyOutcome]:
-    """Return the remedies that are drawn."""
+    """Select the remedies to plot: the first and the quickest, without and with a bought joint.
+
+    If no remedy works, select all that have a stage.
+    """
     if not tuning.working:
         return [outcome for outcome in tuning.outcomes if outcome.stage is not None]
     listed: list[RemedyOutcome] = []

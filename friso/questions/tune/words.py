@@ -431,9 +431,9 @@ def failing(tuning: Advice) -> list[str]:
 
 
 def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
-    """Tell whether another working remedy changes the bandwidth alone.
+    """Tell whether a search over bandwidth failed although another remedy found a bandwidth.
 
-    The search for a bandwidth then found no setting although one exists.
+    The other remedy works, and its stage differs from the one before in bandwidth alone.
     """
     key = tuning.stage.controller.bandwidth_key
     if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:

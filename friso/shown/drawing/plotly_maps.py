@@ -128,10 +128,7 @@ def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
 
 
 def key_rows(labels: Sequence[str], width: int) -> int:
-    """Return the rows of a legend of some width [px].
-
-    Entries stand in columns as wide as the longest.
-    """
+    """Count the rows of a legend of some width [px]; columns are as wide as the longest label."""
     entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
     return math.ceil(len(labels) / max(1, int(width / entry)))
 

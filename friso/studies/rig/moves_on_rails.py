@@ -112,9 +112,9 @@ def at_crossovers(stage: Stage, frequencies: np.ndarray) -> dict[str, np.ndarray
 
 
 def rails(stage: Stage) -> np.ndarray:
-    """Return the seeds of the rails, shape (rails,), the stage's own first.
+    """Return the random seeds of the rails, shape (rails,), beginning with the stage's own.
 
-    A stage with an even rail has one, of no seed (NaN).
+    A stage whose friction does not vary along the rail gets a single NaN.
     """
     if stage.rail is None:
         return np.array([np.nan])

@@ -39,8 +39,10 @@ COLOURS = {
 
 @dataclass(frozen=True)
 class FigureSection:
-    """One item of the thesis with the verdicts on what it claims there; `figure` is None where the evidence is no
-    drawing."""
+    """A figure or table of the thesis, with the verdicts on its claims.
+
+    `figure` is None if the evidence is not a drawing.
+    """
 
     key: str
     title: str

@@ -25,10 +25,10 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 
 @dataclass(frozen=True)
 class ParasiticLimits:
-    """Limits of the crossover set by a parasitic mode at a frequency [Hz] with a damping ratio.
+    """Range of crossovers that a parasitic mode allows, with the joint locked and free.
 
-    For the joint locked and free, it has the range of crossovers [Hz] around the stage's own with a modulus margin of
-    0.5 in all settled states. None if the stage lacks this margin at its own crossover.
+    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] surrounds the stage's own crossover, and has a
+    modulus margin of at least 0.5 in all settled states; None if the stage lacks this margin at its own crossover.
     """
 
     frequency: float

@@ -176,7 +176,7 @@ def plausible(
 
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
-    """Steps that the draws take."""
+    """Return the amount of work for `draws` random rigs, in the units of the progress tally."""
     cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
     costly = any(entry.needs & PARTS.keys() for entry in entries.values())
     return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK

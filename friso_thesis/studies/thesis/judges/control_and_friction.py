@@ -67,8 +67,10 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 
 
 def smallest_gap(evidence: Evidence) -> float:
-    """Return the smallest gap F_s - F_c [N] from which on runs keep moving,
-    over all Coulomb friction forces; NaN of none."""
+    """Return the smallest gap F_s - F_c [N] at which runs keep moving, for any Coulomb friction.
+
+    NaN if no run keeps moving.
+    """
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["friction"]
     static, coulomb, moving, _ = verdict_table(runs, *axes)

@@ -38,7 +38,7 @@ _RATIOS = np.geomspace(2.0, 80.0, 16)
 
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
 def rules_of_design(evidence: Evidence) -> Finding:
-    """Each rule by the maps of the parameter study, and that on parasitic modes by linear analysis."""
+    """Judge each design rule by the parameter maps, and the one on parasitic modes linearly."""
     rig = evidence.rig
     strokes = _stroke(evidence), _softer_needs_less_stroke(evidence)
     return Finding((_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig)))
@@ -190,8 +190,10 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
 
 
 def locked_limit(evidence: Evidence, mass: float) -> float:
-    """Return the crossover [Hz] above which the locked rig of a mass [kg] comes to rest,
-    between those of the map."""
+    """Return the crossover [Hz] above which the rig with locked joint comes to rest.
+
+    The limit is interpolated linearly in the mass [kg], between the masses of the map "system".
+    """
     runs = evidence.maps["system"]
     crossover, masses, moving, _ = verdict_table(runs, CROSSOVER, "mass")
     return float(np.interp(mass, masses, ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))))

@@ -118,7 +118,10 @@ def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
 
 
 def judged_grid(grid: StrokeCrossover) -> Finding:
-    """Return the finding from the grid."""
+    """Judge, over stroke and crossover, whether the crossover limit of hunting falls with stroke.
+
+    Also judge that peaks are counted at every stroke at the lowest crossover, and at none at the highest.
+    """
     limits, share, words = grid.limits, grid.share, reading()
     falls = trend(grid.strokes, limits)
     named = ", ".join(
