@@ -63,7 +63,10 @@ class MoveRange:
         return cls(float(stated.smallest), float(stated.largest), accelerations)
 
     def check(self, stage: Stage) -> None:
-        """Raise InputError unless the motion has time for the largest move at the lowest acceleration."""
+        """Check that the motion has time for the largest move at the lowest acceleration.
+
+        Raises InputError.
+        """
         flat = stage.flat()
         slow = {ACCELERATION: self.accelerations[0]} if self.accelerations and ACCELERATION in flat else {}
         moved = {**flat, **slow}
