@@ -216,6 +216,14 @@ def test_a_filter_that_lags_winds_up() -> None:
     assert lags(Ensemble.held(stage.flat(), 1)).all()
 
 
+@pytest.mark.inner
+def test_a_stage_without_stiffness_hides_no_lag_beside_it() -> None:
+    lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
+    flat = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}}).flat()
+    both = {**flat, "controller.kp": np.array([0.0, flat["controller.kp"]])}
+    assert lags(Ensemble.held(both, 2)).tolist() == [False, True]
+
+
 def test_a_verdict_says_that_it_is_on_the_continuous_equivalent() -> None:
     numerator, denominator, _ = signal.cont2discrete((NUMERATOR, DENOMINATOR), SAMPLE, "bilinear")
     keys = {"numerator": [*map(float, numerator.ravel())], "denominator": [*map(float, denominator)]}

@@ -38,7 +38,7 @@ def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
 def may_run_away(stages: Ensemble) -> np.ndarray:
     """Tell which stages may run away beyond a force limit without anti-windup, shape (count,).
 
-    Their loop at lower gains is unstable or unknown. None of them does without such a limit.
+    Their loop at lower gains is unstable or unknown. All are False without such a limit.
     """
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far != "stable"
@@ -47,7 +47,7 @@ def may_run_away(stages: Ensemble) -> np.ndarray:
 def surely_run_away(stages: Ensemble) -> np.ndarray:
     """Tell which stages surely run away beyond a force limit without anti-windup, shape (count,).
 
-    Their loop at lower gains is unstable. None of them does without such a limit.
+    Their loop at lower gains is unstable. All are False without such a limit.
     """
     far = far_beyond_a_limit(stages)
     return np.zeros(stages.count, bool) if far is None else far == "unstable"
@@ -147,7 +147,6 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     return stable & ~may_run_away(stages) & ~lags(stages)
 
 
-@np.errstate(all="ignore")
 def lags(stages: Ensemble) -> np.ndarray:
     """Return which stages have a controller that lags instead of integrating, shape (count,).
 
@@ -155,18 +154,27 @@ def lags(stages: Ensemble) -> np.ndarray:
     good deal smaller than for a constant error. The force then rises while friction holds the stage, as an integral's
     does.
     """
+    at_once, controller = CheckSettings.current().loops_at_once, stages.structure.controller
+    lagging = np.zeros(stages.count, bool)
+    if controller is not None and not controller.integral:
+        pulled_back = np.flatnonzero(stages.number("stiffness") > 0)
+        for part in np.split(pulled_back, range(at_once, pulled_back.size, at_once)) if pulled_back.size else ():
+            lagging[part] = _lags(stages.take(part))
+    return lagging
+
+
+@np.errstate(all="ignore")
+def _lags(stages: Ensemble) -> np.ndarray:
+    """Tell which controllers without integral lag, of stages few enough for the memory."""
     from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
 
-    settings, form = CheckSettings.current(), stages.structure
-    stiffness, rate = stages.number("stiffness"), stages.number("rate")
-    if form.controller is None or form.controller.integral or not np.all(stiffness > 0):
-        return np.zeros(stages.count, bool)
+    settings, rate = CheckSettings.current(), stages.number("rate")
+    mass = stages.number("stiffness") / rate**2
     lowest, highest = settings.lag_rates
     omega = np.geomspace(lowest * rate.min(), highest * rate.max(), settings.lag_points)
     control = compensator(stages.flat, stages.count).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[:, :, 0]
     gain = np.abs(control[..., 0] + 1j * omega * control[..., 1])
-    acts = gain > (stiffness / rate**2)[:, None] * omega**2
-    return np.any(acts & (gain < settings.lag_gain * gain[:, :1]), axis=1)
+    return np.any((gain > mass[:, None] * omega**2) & (gain < settings.lag_gain * gain[:, :1]), axis=1)
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
