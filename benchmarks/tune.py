@@ -33,7 +33,7 @@ from friso.remedies.method import machines_of_search, tune
 from friso.remedies.search import Budget, Search
 from friso.remedies.trials import modulus_margins, moves_of_points
 from friso.remedies.variables import BANDWIDTH
-from friso.remedies.verified import ONE, performance_of
+from friso.remedies.verified import ONE, Performance, moving
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
 
@@ -122,6 +122,11 @@ def brute(search: Search, count: int, most: float) -> float:
         if len(clear) and (meets := search.share(shares[clear]) >= search.goal.surely(search.fresh.count)).any():
             return float(slowest[clear[meets]].min())
     return float("inf")
+
+
+def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
+    """Moves, margins and what attracts, with sampling and delay of the stage `drive` for the margins."""
+    return moving(stage, machines, goal, drive).surveyed(stage, machines, goal)
 
 
 def meeting(stage: Stage, fresh: Fleet, goal: Goal, drive: Stage) -> float:

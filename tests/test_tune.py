@@ -16,6 +16,7 @@ from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
 import friso
+from benchmarks.tune import performance_of
 from friso import Stage, load, loads
 from friso.app import questions
 from friso.cli.asking import show
@@ -75,7 +76,7 @@ from friso.remedies.settings import RemedySettings
 from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import BANDWIDTH, of_key
-from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, performance_of, unmet_goals
+from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, missed_parts, unsettled_parts
 from friso.remedies.window import windows
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.prefixes import NOTHING, with_unit
@@ -85,6 +86,11 @@ from friso.stage.correlations import Correlations
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AS_IS = partial(Remedy.settled_on, "")
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6, further=74)
+
+
+def unmet_goals(confirmation: Any, measured: Performance, goal: Goal) -> tuple[str, ...]:
+    """All parts of the goal that a stage misses, or may miss."""
+    return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,6 @@ from friso.remedies.goal import Goal
 from friso.remedies.settings import RemedySettings
 from friso.stage import Stage
 
-SETTLES = "settles"
-
 
 @dataclass(frozen=True)
 class Confirmation:
@@ -44,7 +42,7 @@ class Confirmation:
     def verdict(self) -> str:
         """Return the verdict at the stage's own bandwidth; "failed" if it was not computed."""
         own = self.word or "failed"
-        return own if self.hunting.target is None or own != SETTLES else "bistable"
+        return own if self.hunting.target is None or own != "settles" else "bistable"
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -52,7 +50,7 @@ class Confirmation:
         if self.word is None:
             return ("given up",)
         parts = {
-            "verdict": self.verdict != SETTLES,
+            "verdict": self.verdict != "settles",
             "certain": not self.certain,
             "distance": not self.quiet[self.factors < 1].all(),
             "window": not self.quiet[self.factors > 1].all(),

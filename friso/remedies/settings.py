@@ -240,7 +240,7 @@ class RemedySettings(Settings):
     """Locates an end to a sixteenth of a step; finer is below the spread of machines."""
 
     surveyed_halvings: int = setting(2, "")
-    """The same for the ends at which something attracts machines: each halving costs surveys of all of them."""
+    """Halvings of the range in which a window ends because something attracts machines: each costs surveys of all."""
 
     worthwhile_share: float = setting(0.85, "")
     """A change counts as smaller than another if its logarithm is below this share of the other's: to verify one that

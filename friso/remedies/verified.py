@@ -155,13 +155,7 @@ class Performance:
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
         """Return the performance with further machines measured."""
-        settings = RemedySettings.current()
-        moved = replace(
-            self,
-            moves=moves_of_points(Remedy.settled_on("", stage), ONE, machines, goal, rtol=settings.move_rtol),
-            margin=modulus_margins(Remedy.settled_on("", stage), ONE, machines, drive),
-            attraction=Attraction.none(machines.count),
-        )
+        moved = replace(self, **_measured(stage, machines, goal, drive))
         meets = moved._surveyed(stage, machines, np.arange(machines.count), goal, at_once=True)._meets_all(goal)
         sizes = np.append(self.sizes, machines.sizes)
         return replace(self, further=np.append(self.further, meets), sizes=sizes)
@@ -228,26 +222,27 @@ class RemedyOutcome:
         return np.inf if self.points is None else float(self.points.cost(goal).min())
 
 
-def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure a stage on machines, with sampling and delay of the stage `drive` for its margins."""
-    return moving(stage, machines, goal, drive).surveyed(stage, machines, goal)
-
-
 @np.errstate(all="ignore")
 def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """Measure the moves and margins of a stage on machines; what attracts these is not surveyed (see `surveyed`)."""
-    settings = RemedySettings.current()
-    remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
     return Performance(
-        moves_of_points(remedy, ONE, machines, goal, rtol=settings.move_rtol),
-        modulus_margins(remedy, ONE, machines, drive),
-        Attraction.none(machines.count),
-        min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
-        _stiffness(flat),
+        **_measured(stage, machines, goal, drive),
+        own_margin=min(settled_margin(linear_flat(drive, state)) for state in gain_states({**flat, **timing(drive)})),
+        stiffness=_stiffness(flat),
         sizes=machines.sizes,
         moves_drawn=machines.moves,
     )
+
+
+def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[str, Any]:
+    """Return moves and margins on machines, and that nothing has been surveyed yet, by field of `Performance`."""
+    remedy = Remedy.settled_on("", stage)
+    return {
+        "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),
+        "margin": modulus_margins(remedy, ONE, machines, drive),
+        "attraction": Attraction.none(machines.count),
+    }
 
 
 def _stiffness(flat: Mapping[str, Any]) -> float:
@@ -271,16 +266,11 @@ def checked(stage: Stage) -> Case:
         return check_given(stage)
 
 
-def unmet_goals(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return which parts of the goal a stage misses, or may miss.
+def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
+    """Return why the stage itself is not sure to work: its verdicts, bandwidth and margin.
 
     They are names of `friso.questions.tune.present_words.DOUBTS`.
     """
-    return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
-
-
-def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return why the stage itself is not sure to work: its verdicts, bandwidth and margin."""
     rounded = 1 + RemedySettings.current().rounded_share
     listed = [*confirmation.doubts]
     if goal.bandwidth_limit is not None and not loop_bandwidth(confirmation.stage) <= goal.bandwidth_limit * rounded:
