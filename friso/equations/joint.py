@@ -31,13 +31,12 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pul
         stroke = key("joint.stroke")
         kinks = touching(deflection)
         reached = key("joint.limiter_stiffness") * stroke
-        if limiter_pulls:
-            force = leaves + beyond_stops(kinks, contact, reached)
-        else:
+        ahead, behind = (kink.beyond for kink in kinks)
+        if not limiter_pulls:
             pushing = stops(contact, reached, "contact")
-            pushes = [touch.beyond * push.beyond for touch, push in zip(kinks, pushing, strict=True)]
-            force = leaves + pushes[0] * (contact - reached) + pushes[1] * (contact + reached)
+            ahead, behind = ahead * pushing[0].beyond, behind * pushing[1].beyond
             kinks = (*kinks, *pushing)
+        force = leaves + beyond_stops(ahead, behind, contact, reached)
     outputs = {
         "joint_deflection": Output(deflection, "m", "joint deflection"),
         "joint_force": Output(force, "N", "joint force"),

@@ -60,10 +60,10 @@ def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
 
 
-def beyond_stops(stops: tuple[Kink, Kink], contact: sp.Expr, reached: sp.Expr) -> sp.Expr:
+def beyond_stops(ahead: sp.Expr, behind: sp.Expr, contact: sp.Expr, reached: sp.Expr) -> sp.Expr:
     """Return the force [N] between two bodies at stops; zero between the stops.
 
-    It is what `contact` would exert [N] if it always touched, less what it has `reached` at the stops [N].
+    `ahead` and `behind` are 1 where that stop acts, else 0. The force is what `contact` would exert [N] if it always
+    touched, less what it has `reached` at the stops [N].
     """
-    ahead, behind = stops
-    return (ahead.beyond + behind.beyond) * contact + (behind.beyond - ahead.beyond) * reached
+    return (ahead + behind) * contact + (behind - ahead) * reached

@@ -109,14 +109,18 @@ def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
 
 def rests(flat: Mapping[str, Any]) -> bool:
     """Tell whether the reference stands in the end, so that a stage may hunt about a place."""
-    form, rows = form_of(flat), pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
-    return motion_of(flat).rests or bool(np.all(at_rest(form, rows[:, -1])))
+    return motion_of(flat).rests or _ends_without(1, flat)
 
 
 def ends_evenly(flat: Mapping[str, Any]) -> bool:
     """Tell whether the reference stands in the end, or moves on at constant velocity."""
+    return _ends_without(2, flat)
+
+
+def _ends_without(derivative: int, flat: Mapping[str, Any]) -> bool:
+    """Tell whether this derivative of the reference, and all higher ones, are zero in the end, for all stages."""
     rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
-    return bool(np.all(at_rest(form_of(flat), rows[:, -1], 2)))
+    return bool(np.all(at_rest(form_of(flat), rows[:, -1], derivative)))
 
 
 def returns(flat: Mapping[str, Any]) -> bool:
@@ -132,8 +136,8 @@ def last_corner(flat: Mapping[str, Any]) -> Any:
 def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np.ndarray:
     """Return the time [s], shape (runs,), from which the last part of runs is looked at.
 
-    They `ended` [s], shape (runs,), and that part begins after a `share` of them, say 0.75. Where the last `corner`
-    [s] of the reference lies late, it begins at least a quarter less than that share of the time after it.
+    Runs end at `ended` [s], shape (runs,); the last part begins after a `share` of a run, say 0.75. Where the last
+    `corner` [s] of the reference lies late, it begins after share - 0.25 of the time that follows the corner.
     """
     late = np.where(corner < ended, corner, 0.0)
     return np.maximum(share * ended, late + (share - 0.25) * (ended - late))

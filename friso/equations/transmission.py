@@ -30,8 +30,8 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
     contact = stiffness * deflection + key("transmission.damping") * rate
     force, kinks = contact, ()
     if backlash:
-        kinks = flanks(deflection)
-        force = beyond_stops(kinks, contact, stiffness * BACKLASH / 2)
+        kinks = ahead, behind = flanks(deflection)
+        force = beyond_stops(ahead.beyond, behind.beyond, contact, stiffness * BACKLASH / 2)
     outputs = {
         "transmission_deflection": Output(deflection, "m", "motor minus load"),
         "transmission_force": Output(force, "N", "transmission force"),

@@ -70,7 +70,7 @@ class RationalController(ControllerSection):
     speed: Annotated[float, Number(positive, "1.0")] = 1.0
     """By what all frequencies of zeros and poles are multiplied."""
     sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
-    """Of a transfer function in z; left out, it is one in s."""
+    """Time between samples of a transfer function in z; without it, the transfer function is in s."""
 
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"gain": 2, "speed": 1})
     loop_gain = ("gain",)

@@ -168,7 +168,7 @@ class MoveProfile(Motion):
         Values,
         Several(Quantity("m", not_zero, "5 mm"), ("5 mm", "-5 mm", "20 um"), 1, _MOST, alone=True),
     ]
-    """Of the moves one after the other, forward or (negative) back."""
+    """Distances of the moves, one after the other: forward, or back (negative)."""
     velocity: Annotated[Value, Quantity("m/s", positive, "0.5 m/s")]
     acceleration: Annotated[Value, Quantity("m/s^2", positive, "10 m/s^2")]
     jerk: Annotated[Value | None, Quantity("m/s^3", positive, "1000 m/s^3")] = None
