@@ -465,7 +465,8 @@ def test_a_controller_that_changes_its_gains_is_named(change: str, wording: Word
     doubts = [*changing_gains.find(RecordCase(followed, inverse_model(followed, 5.0)))]
     assert len(doubts) == (change in ("after", "above", "beyond"))
     for doubt in doubts:
-        assert f"The controller's gains change {change}" in doubt.words
+        assert f"force {change}" in doubt.words
+        assert "gains change" in doubt.words
         assert doubt.size == pytest.approx(0.6, rel=0.15)
         wording(doubt.words)
 

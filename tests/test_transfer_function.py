@@ -217,6 +217,29 @@ def test_a_filter_that_lags_winds_up() -> None:
 
 
 @pytest.mark.inner
+def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> None:
+    """Two poles at 0.5 1/s and a static gain 1.11 times that of a slip: +-0.98 mm every 2.2 s."""
+    slow, fast = np.poly([-0.5, -0.5]), np.poly([-0.5 / np.sqrt(0.9)] * 2)
+    friction = {**TABLES["friction"], "static": "1 N", "coulomb": "0.02 N", "stribeck_velocity": "1 mm/s"}
+    friction |= {
+        "bristle_stiffness": "1e7 N/m",
+        "bristle_damping": "6000 N*s/m",
+        "viscous": "0 N*s/m",
+        "stribeck_exponent": 2,
+    }
+    controller = {
+        "kind": "transfer_function",
+        "numerator": [*map(float, 1000 * np.polymul(fast, [1.9e-4, 1.0]))],
+        "denominator": [*map(float, np.polymul(slow, [9.5e-6, 1.0]))],
+    }
+    masses, motion = {"cart": "1 kg"}, {"kind": "release", "displacement": "1.3 mm", "duration": "300 s"}
+    stage = Stage(masses=masses, friction=friction, controller=controller, motion=motion)
+    assert lags(Ensemble.held(stage.flat(), 1)).all()
+    assert not hunting(stage).certain
+    assert "swings" in friso.simulate(stage).sentences()[0]
+
+
+@pytest.mark.inner
 def test_a_stage_without_stiffness_hides_no_lag_beside_it() -> None:
     lag = {"kind": "lead_lag", "zero_frequency": "0.5 Hz", "pole_frequency": "0.005 Hz"}
     flat = Stage(**{**TABLES, "controller": {**PID, "ki": "0 N/(m*s)", "filters": [lag]}}).flat()

@@ -912,7 +912,8 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
     sizes = np.geomspace(1e-5, 1e-1, 102)[1:-1]
     moves = Moves(*(np.where(np.isin(np.arange(100), missed), np.inf, 1.0)[None] for _ in range(3)))
     measured = Performance(moves, np.ones((1, 100)), Attraction.none(100), 1.0, 1.0, np.zeros(0, bool), sizes)
-    between = replace(measured, moves_drawn=MoveRange(1e-5, 1e-1)).held_moves(Goal())
+    assert measured.held_moves(Goal()) is None  # nobody knows yet which machines hunt
+    between = replace(measured, moves_drawn=MoveRange(1e-5, 1e-1), is_surveyed=True).held_moves(Goal())
     ends = {0: 1e-5, 99: 1e-1}
     expected = held and tuple(ends.get(end, sizes[end] if isinstance(end, int) else end) for end in held)
     assert between == (None if held is None else pytest.approx(expected))
@@ -1422,7 +1423,8 @@ def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) 
     moves = Moves(np.where(ok["settling"], 0.1, np.inf), np.full((1, machines), 0.1), np.where(ok["force"], 1.0, 99.0))
     margin = np.where(ok["margin"], 0.6, 0.1)
     survey = Attraction(~ok["hunting"], np.ones((1, machines), bool), np.ones((1, machines), bool))
-    return SimpleNamespace(doubts=given_up, unstable=()), Performance(moves, margin, survey, 0.6, 1e6)
+    measured = Performance(moves, margin, survey, 0.6, 1e6, is_surveyed=True)
+    return SimpleNamespace(doubts=given_up, unstable=()), measured
 
 
 PARTS = ("hunting", "settling", "margin", "force")
@@ -1439,6 +1441,25 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     assert unmet_goals(*made_up(400, **some), FORCE_LIMITED) == ()
     assert unmet_goals(*made_up(400, **many), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
+
+
+def test_without_a_survey_nobody_knows_how_many_machines_meet_the_goal() -> None:
+    """38 of 40 meet the rest, and all of these may hunt."""
+    surveyed = made_up(settling=range(2))[1]
+    unknown = replace(surveyed, is_surveyed=False).share(Goal())
+    assert np.isnan(unknown.probability)
+    assert (unknown.low, unknown.high) == (0.0, surveyed.share(Goal()).high)
+
+
+def test_a_search_whose_work_ends_before_its_first_point_finds_nothing(rigid: Stage, machines: Fleet) -> None:
+    tuned = rigid.replace({"controller.crossover": "20 Hz", "controller.alpha": 0.2})
+    remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
+    assert remedy is not None
+    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None)
+    with RemedySettings(search_work=1.0).in_use():
+        assert [*least_changes(search)] == []
+    assert search.cut
+    assert len(search.points.shares) == 0
 
 
 def test_a_time_that_may_be_never_has_its_lower_end() -> None:

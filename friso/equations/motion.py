@@ -137,7 +137,8 @@ def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np
     """Return the time [s], shape (runs,), from which the last part of runs is looked at.
 
     Runs end at `ended` [s], shape (runs,); the last part begins after a `share` of a run, say 0.75. Where the last
-    `corner` [s] of the reference lies late, it begins after share - 0.25 of the time that follows the corner.
+    `corner` [s] of the reference lies late, it begins after share - 0.25 of the time that follows the corner: a stage
+    has a quarter of that time at least to settle where the share is 0.5 or more.
     """
     late = np.where(corner < ended, corner, 0.0)
     return np.maximum(share * ended, late + (share - 0.25) * (ended - late))

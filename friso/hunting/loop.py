@@ -150,9 +150,8 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
 def lags(stages: Ensemble) -> np.ndarray:
     """Return which stages have a controller that lags instead of integrating, shape (count,).
 
-    At standstill it pushes ever harder, though it has no integral: at some frequency below the crossover its gain is a
-    good deal smaller than for a constant error. The force then rises while friction holds the stage, as an integral's
-    does.
+    It pushes ever harder at standstill though it has no integral: below the crossover its force comes behind the
+    error, which feeds a swing. A controller whose force never does so below the crossover only takes energy out.
     """
     at_once, controller = CheckSettings.current().loops_at_once, stages.structure.controller
     lagging = np.zeros(stages.count, bool)
@@ -171,10 +170,11 @@ def _lags(stages: Ensemble) -> np.ndarray:
     settings, rate = CheckSettings.current(), stages.number("rate")
     mass = stages.number("stiffness") / rate**2
     lowest, highest = settings.lag_rates
-    omega = np.geomspace(lowest * rate.min(), highest * rate.max(), settings.lag_points)
+    omega = rate[:, None] * np.geomspace(lowest, highest, settings.lag_points)
     control = compensator(stages.flat, stages.count).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[:, :, 0]
-    gain = np.abs(control[..., 0] + 1j * omega * control[..., 1])
-    return np.any((gain > mass[:, None] * omega**2) & (gain < settings.lag_gain * gain[:, :1]), axis=1)
+    stiffness = -(control[..., 0] + 1j * omega * control[..., 1])
+    acts = np.abs(stiffness) > mass[:, None] * omega**2
+    return np.any(acts & (np.angle(stiffness) < -settings.lag_angle), axis=1)
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:

@@ -210,14 +210,15 @@ class CheckSettings(Settings):
     least_growth_rate: float = setting(1e-5, "natural frequencies")
     """Slower growth is rounding: a stage that sticks has poles at 0."""
 
-    lag_gain: float = setting(0.9, "static gains")
-    """A controller whose gain falls below this is a lag; from here on up, filters of PD controllers bend it."""
+    lag_angle: float = setting(1e-3, "rad")
+    """A force further behind the error is a lag, with a static gain a few thousandths above that of a slip; less stops
+    even on a Coulomb level of a hundredth of the static one. Rounding is far below."""
 
     lag_rates: tuple[float, float] = setting((1e-6, 30.0), "natural frequencies")
     """Rates at which lags are sought: a slower one rises too slowly to break a stage away, and no loop acts faster."""
 
     lag_points: int = setting(200, "")
-    """Rates looked at: 25 a decade, finer than any lag."""
+    """Rates looked at: 27 a decade, finer than any lag."""
 
     viscous_speed: float = setting(1e3, "loop speeds")
     """By this speed, friction that falls with speed has become viscous."""

@@ -106,7 +106,7 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
             way = ways[(ways @ (one - home)).argmax()]
             finer = changed(one - way * np.linspace(0, 1, closest)[1:-1, None])
             closest = 2  # what fails on other machines is taken on in larger steps
-            for some in search.tries(finer) if len(finer) else ():
+            for some in search.tries(finer):
                 yield from islice(_robust(search, some, enough), 1)
             yield one
 

@@ -150,10 +150,12 @@ def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOu
 
     They are the least change and what settles soonest; if these are the same, the next larger change follows.
     """
-    fastest = min(working, key=lambda outcome: slowest(outcome, goal), default=None)
-    if not working or fastest is working[0]:
+    if not working:
+        return ()
+    fastest = min(working, key=lambda outcome: slowest(outcome, goal))
+    if fastest is working[0]:
         return tuple(working[:2])
-    return (working[0], fastest) if fastest else ()
+    return working[0], fastest
 
 
 def tune(
@@ -209,6 +211,8 @@ def tune(
         report("the stage as it is", 0)
         case, present = checked(ideal), present.surveyed(ideal, unseen, goal)
         unmet = missed_parts(present, goal) or unsettled_parts(confirmed(ideal, goal), present, goal)
+        if not unmet and case.verdict in ("hunts", "bistable"):
+            unmet = ("verdict",)
         if not unmet:
             listed = []  # nothing has to change
         for joint in (False, True):

@@ -68,6 +68,12 @@ class TriedPoints:
     whole: np.ndarray
     moves_from: np.ndarray
 
+    @classmethod
+    def none(cls, variables: int) -> TriedPoints:
+        """Return no points at all, of so many variables."""
+        none = np.zeros(0)
+        return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
+
     def take(self, numbers: np.ndarray) -> TriedPoints:
         """Return the points with these numbers."""
         return TriedPoints(*(column[numbers] for column in vars(self).values()))
@@ -150,10 +156,9 @@ class Search:
 
     @property
     def begun(self) -> TriedPoints:
-        """Return all points that were tried, including those that were given up early."""
-        return TriedPoints(
-            *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
-        )
+        """Return all points that were tried, if any, including those that were given up early."""
+        tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
+        return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
 
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
@@ -169,7 +174,7 @@ class Search:
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
         """Try points (points, variables) a few at a time, and return those that break no constraint."""
         tuning = RemedySettings.current()
-        for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)):
+        for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
             with self._allowed(self._work):
                 self.tried.append(self.measured(few))
@@ -381,8 +386,6 @@ class Search:
         fresh machines is yielded.
         """
         settings = RemedySettings.current()
-        if not self.tried:
-            return
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], settings.alike_share

@@ -41,7 +41,8 @@ class Performance:
     They are its `moves`, the modulus margins, and what attracts the machines. `own_margin` is the least modulus margin
     of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. For `further`
     machines, shape (n,), it is only known whether they meet the whole goal. `sizes` [m] are the moves of all machines,
-    the further ones last, which were drawn from the range `moves_drawn`.
+    the further ones last, which were drawn from the range `moves_drawn`. Until the performance `is_surveyed`, nobody
+    knows which machines hunt.
     """
 
     moves: Moves
@@ -52,6 +53,7 @@ class Performance:
     further: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     sizes: np.ndarray = field(default_factory=lambda: np.zeros(0))
     moves_drawn: MoveRange | None = None
+    is_surveyed: bool = False
 
     @property
     def count(self) -> int:
@@ -92,17 +94,21 @@ class Performance:
         }
 
     def share(self, goal: Goal) -> Share:
-        """Return the probability that a machine meets the whole goal, with its interval."""
+        """Return the probability that a machine meets the whole goal, with its interval.
+
+        Without a survey, the machines that meet the rest may hunt: the probability is NaN and only its limit is known.
+        """
         meets = self._all_meeting(goal)
-        return share(meets, np.ones(meets.shape, bool))
+        whole = share(meets, np.ones(meets.shape, bool))
+        return whole if self.is_surveyed else Share(np.nan, 0.0, whole.high)
 
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
-        """Return the smallest and largest move [m] between which the goal holds; None if there are none.
+        """Return the smallest and largest move [m] between which the goal holds; None if there are none or none known.
 
         Of the moves next to either end, as many as one likes, at least the share wanted meet the goal.
         """
         order = np.argsort(self.sizes, kind="stable")
-        if self.moves_drawn is None or not order.size:
+        if self.moves_drawn is None or not order.size or not self.is_surveyed:
             return None
         held = longest_run(self._all_meeting(goal)[order], goal.share)
         if held is None:
@@ -131,7 +137,7 @@ class Performance:
         others are left out: the share is that of fewer machines then.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
-        measured = self._surveyed(stage, machines, first, goal)
+        measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
         if np.count_nonzero(self._meets_all(goal) & ~measured._meets_all(goal)) > (1 - goal.share) * machines.count:
             return measured._first(first.size)
         return measured._surveyed(stage, machines, others, goal, at_once=True)

@@ -23,11 +23,11 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     settings = DoubtSettings.current()
     if "reference" not in case.log:
         return
-    columns, force, course = control_law(case)
-    fewest = settings.rows_for_each_gain * columns.shape[1]
-    if len(force) < 2 * fewest:
+    signals, stretch, course = control_law(case)
+    fewest = settings.rows_for_each_gain * (signals.shape[1] - 1 + len(np.unique(stretch)))
+    if len(signals) < 2 * fewest:
         return
-    left = least_squares(columns, force)[1]
+    left = least_squares(*_deviations(signals, stretch))[1]
     shares = np.linspace(min(settings.shares_of_a_part), max(settings.shares_of_a_part), settings.levels_of_a_part)
     best, where, ratio = settings.power_left_by_changing_gains * float(left @ left), "", 1.0
     for name, signal in course.items():
@@ -35,27 +35,28 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
             below = signal < level
             if min(below.sum(), (~below).sum()) < fewest:
                 continue
-            (law, rest), (_, other) = (least_squares(columns[rows], force[rows]) for rows in (below, ~below))
+            one, two = (_deviations(signals[rows], stretch[rows]) for rows in (below, ~below))
+            (law, rest), (_, other) = least_squares(*one), least_squares(*two)
             if rest @ rest + other @ other < best:
                 best, where = float(rest @ rest + other @ other), name.format(level)
-                ratio = _ratio(columns[~below] @ law, force[~below])
+                ratio = _ratio(two[0] @ law, two[1])
     if not where or not abs(np.log(ratio)) > settings.logarithm_of_a_gain:
         return
-    one, two = (np.sqrt(squares / len(force)) for squares in (left @ left, best))
+    one_law, two_laws = (np.sqrt(squares / len(signals)) for squares in (left @ left, best))
     words = (
-        f"The controller's gains change {where}, so that for the same error the force is {ratio:.2g} times as large: "
-        f"one controller with fixed gains leaves {one:.2g} {case.unit} of the force, two leave {two:.2g} {case.unit}; "
-        "a record with fixed gains would decide it"
+        f"The controller answers the same error with {ratio:.2g} times the force {where}: its gains change, or a "
+        f"setting against friction acts there. One controller with fixed gains leaves {one_law:.2g} {case.unit} of the "
+        f"force, two leave {two_laws:.2g} {case.unit}; a record with fixed gains and no such setting would decide it"
     )
     yield RaisedDoubt(words, ratio)
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Return what a linear controller makes its force of, that force [N], and what gains may depend on, by row.
+    """Return the signals of a linear controller, the stretch of each row, and what gains may depend on, by row.
 
-    The columns, shape (rows, columns), hold the error, its derivatives and integral, the motion of the reference and
-    its direction, all through the same filter. Rows with a force at its limits are left out; the integral may stand
-    meanwhile, so that each stretch between them has a constant of its own.
+    The signals, shape (rows, 9), are the error, its derivatives and integral, the motion of the reference and its
+    direction, and last the force [N], all through the same filter. Rows with a force at its limits are left out; they
+    part the stretches.
     """
     settings, log, part = DoubtSettings.current(), case.log, case.log.longest
     step, cutoff = log.sample_time, settings.bandwidths_of_a_controller * case.inverse.bandwidth
@@ -67,19 +68,16 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
     stretch = np.cumsum(np.diff(inside.astype(int), prepend=int(inside[0])) > 0)
     speed = np.abs(wanted.velocity)
     creep = settings.speed_share_of_creeping * speed.max()
-    columns = np.stack(
-        [
-            error,
-            np.gradient(error, step),
-            np.gradient(np.gradient(error, step), step),
-            np.cumsum(error) * step,
-            wanted.position - wanted.position.mean(),
-            wanted.velocity,
-            wanted.acceleration,
-            np.clip(wanted.velocity / creep, -1.0, 1.0) if creep > 0 else np.zeros_like(error),
-            *(stretch == np.arange(1 + stretch[-1])[:, None]),
-        ],
-        axis=1,
+    signals = (
+        error,
+        np.gradient(error, step),
+        np.gradient(np.gradient(error, step), step),
+        np.cumsum(error) * step,
+        wanted.position - wanted.position.mean(),
+        wanted.velocity,
+        wanted.acceleration,
+        np.clip(wanted.velocity / creep, -1.0, 1.0) if creep > 0 else np.zeros_like(error),
+        low_pass(log["force"][part], step, cutoff),
     )
     rows = np.flatnonzero(inside)[:: max(1, round(1 / (4 * cutoff * step)))]
     course = {
@@ -87,7 +85,18 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
         "above {:.2g} m/s": np.where(speed > creep, speed, 0.0)[rows],
         "beyond {:.3g} m": wanted.position[rows],
     }
-    return columns[rows], low_pass(log["force"][part], step, cutoff)[rows], course
+    return np.stack(signals, axis=1)[rows], stretch[rows], course
+
+
+def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the columns of a control law and its force [N] as deviations from their means over each stretch.
+
+    The integral may stand between stretches, so that the force of each has a constant of its own.
+    """
+    _, number, count = np.unique(stretch, return_inverse=True, return_counts=True)
+    means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
+    deviations = signals - means[number]
+    return deviations[:, :-1], deviations[:, -1]
 
 
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:

@@ -25,12 +25,13 @@ from friso.shown.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
-    """Return the whole design except its files; of one that was interrupted, what is decided."""
+    """Return the whole design except its files; what an interrupted one has not decided is null."""
     if isinstance(design, UnfinishedDesign):
         return plain_json(
             {
                 "conclusion": " ".join(so_far(design)),
                 "interrupted": True,
+                **dict.fromkeys(("feasible", "relax", "without", "front", "verification")),
                 "stage": design.original.name,
                 "spec": design.spec.name,
                 "needed": design.need.isolator,

@@ -31,7 +31,8 @@ def as_it_is(tuning: Advice) -> str:
     if verdict in ("hunts", "bistable"):
         own = f"a limit cycle{' after other moves than its own' * (verdict == 'bistable')}, and"
     else:
-        own = f"{'no' if certain and verdict != 'failed' else 'perhaps a'} limit cycle, but"
+        surely_none = certain and verdict != "failed" and "verdict" not in tuning.unmet
+        own = f"{'no' if surely_none else 'perhaps a'} limit cycle, but"
     return f"As it is: {own} {listed([_missed(name, tuning) for name in tuning.unmet], 'and')}."
 
 

@@ -206,8 +206,8 @@ def goal_words(goal: Goal) -> str:
     limit = "" if most is None else f" and a bandwidth of at most {with_unit(most, 'Hz')}"
     return (
         f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{moving}{force}, "
-        f"with a modulus margin of {goal.margin:g}{limit}, and nothing that attracts them down to "
-        f"{1 / goal.distance:.2f} of their bandwidth"
+        f"with a modulus margin of {goal.margin:g}{limit}, and no hunting at their bandwidth and the lower ones tried, "
+        f"down to {percent(1 / goal.distance)} of it"
     )
 
 
