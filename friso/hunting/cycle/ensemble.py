@@ -131,8 +131,9 @@ class Ensemble:
 
     @property
     def sticking(self) -> int:
-        """Return the index of the state that stays constant while a stage sticks: the position of the body with
-        friction.
+        """Return the index of the state that stays constant while a stage sticks.
+
+        It is the position of the body with friction.
         """
         return self.kernel.cart_position
 
@@ -151,14 +152,14 @@ class Ensemble:
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages at rest with a displacement [m]: filters have followed, everything else is zero.
-        """
+        """Return the states of stages at rest with a displacement [m]: filters have followed, everything else is zero."""
         return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state per displacement [s] at which the actuator exerts the force of the reference,
-        (count,).
+        """Return the integrator state per displacement [s] that relaxes the actuator, (count,).
+
+        The actuator then exerts the force that it exerts at the reference.
         """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
@@ -173,11 +174,10 @@ class Ensemble:
         return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
-        """Return how far integrators are from balancing the constant forces that friction does not hold, shape
-        (count,).
+        """Return the imbalance of integrator and constant forces of sticking stages, (count,).
 
-        `states` have the shape (count, states), or (n, states) for the stage `number` alone; then the result has the
-        shape (n,).
+        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), or (n,
+        states) for the stage `number` alone; then the result has the shape (n,).
         """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]

@@ -58,10 +58,10 @@ class LandingMap:
 
     @classmethod
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
-        """Make the map from the landings of runs of one stage, without the starts, whose next landing depends on the
-        start.
+        """Make the map from the landings of runs of one stage.
 
-        `length` [m] is the deflection of the loop by the break-away force.
+        The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
+        deflection of the loop by the break-away force.
         """
         settings = SurveySettings.current()
         distances = landings.distances / length
