@@ -42,7 +42,10 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Reversal:
-    """A reversal of the reference: time [s], place [m], and the largest error [m] until half-way to the next reversal."""
+    """A reversal of the reference: time [s], place [m], and error [m].
+
+    The error is the largest one until half-way to the next reversal.
+    """
 
     time: float
     position: float

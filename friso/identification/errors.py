@@ -87,8 +87,9 @@ def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
 
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
-    """Return the fraction of a residual's power in its means over the bins of another signal, less what chance
-    explains.
+    """Return the fraction of a residual's power in its means over the bins of another signal.
+
+    The part that chance explains is subtracted.
     """
     settings = IdentificationSettings.current()
     edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)

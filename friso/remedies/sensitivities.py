@@ -316,7 +316,10 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 
 
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
-    """Return the least modulus margin and its derivatives by central differences; None if a settled state is unstable."""
+    """Return the least modulus margin and its derivatives by central differences.
+
+    Returns None if a settled state is unstable.
+    """
     settings = RemedySettings.current()
     members = settled_members(flat)
     loops = scan_stability(flat, members)

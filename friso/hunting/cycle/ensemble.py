@@ -152,7 +152,10 @@ class Ensemble:
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages at rest with a displacement [m]: filters have followed, everything else is zero."""
+        """Return the states of stages at rest with a displacement [m].
+
+        Filters have followed the displacement; everything else is zero.
+        """
         return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
     @cached_property

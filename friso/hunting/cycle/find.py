@@ -35,7 +35,10 @@ UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which a deviation changes by the factor e, if `multiplier` acts once per `returned` [s]."""
+    """Return the time [s] in which a deviation changes by the factor e.
+
+    `multiplier` acts once per time `returned` [s].
+    """
     return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
 
 

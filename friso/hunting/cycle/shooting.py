@@ -248,7 +248,10 @@ class _Shooting:
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a Newton step of limited length for one orbit with the state magnitudes `scales`, and return the step."""
+        """Take a Newton step of limited length for one orbit, and return it.
+
+        `scales` are the magnitudes of the states.
+        """
         settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
         far = abs(step[sticking]) / (settings.newton_stride * abs(self.states[k, sticking]))

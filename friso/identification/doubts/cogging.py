@@ -60,8 +60,9 @@ def _waves(position: np.ndarray, pitch: float) -> list[np.ndarray]:
 
 
 def _explained_by(position: np.ndarray, pitch: float, rest: np.ndarray) -> float:
-    """Return the power [N^2] of a residual force, (n,), that a force with a pitch [m] explains, without its constant
-    part.
+    """Return the power [N^2] of a residual force, (n,), that a force with a pitch [m] explains.
+
+    The constant part does not count.
     """
     columns = np.stack([*_waves(position, pitch), np.ones(len(rest))], axis=1)
     solution = np.linalg.lstsq(columns, rest, rcond=None)[0]

@@ -1,4 +1,7 @@
-"""Doubt: the record is so slow that the Stribeck effect acts throughout, which leaves friction at higher speeds open."""
+"""Doubt: the record is so slow that the Stribeck effect acts throughout.
+
+Friction at higher speeds is then open.
+"""
 
 from __future__ import annotations
 

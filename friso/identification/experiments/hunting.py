@@ -1,4 +1,4 @@
-"""Analyse a log of hunting: number, period, amplitude and evenness of swings, beside the cycle that friso predicts.
+"""A log of hunting: how often the stage swings, how fast, how far and how evenly, beside the cycle that friso predicts.
 
 Thesis, Sec. 3.2.2 and 4.3.2, Fig. 24 to 27.
 """

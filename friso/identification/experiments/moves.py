@@ -1,4 +1,4 @@
-"""Analyse moves, with or without a reference: mass, friction and constant force, and the joint if it shows."""
+"""Moves, with a reference or without: mass, friction and constant force, and the joint where it shows."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Analyse small motion of a sticking bearing: stiffness and damping of its bristles.
+"""Small motion about a place at which the bearing sticks: stiffness and damping of its bristles.
 
 The force on a body that sticks is F = m a + sigma_0 z + (sigma_1 dz/dt + sigma_2 v) + c, with the deflection of the
-bristles dz/dt = v (1 - q z sign v), q = sigma_0/F_s (LuGre; Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425).
-With measured motion it is linear in everything but q. Fast motion shows the damping beside the stiffness.
+bristles dz/dt = v (1 - q z sign v), q = sigma_0/F_s (LuGre; Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425):
+linear in all but q, once the motion is measured. Motion that is quick enough shows the damping beside the stiffness.
 """
 
 from __future__ import annotations

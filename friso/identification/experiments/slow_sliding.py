@@ -1,9 +1,10 @@
-"""Analyse slow motion that swings, or sticks and slips: Coulomb and static friction, Stribeck velocity.
+"""Slow motion that swings, or sticks and slips: Coulomb and static friction, Stribeck velocity.
 
-Where friction falls steeply no controller holds a constant speed. The motion passes through all those speeds: LuGre's
-bristles, dz/dt = v - sigma_0 |v| z / g(v) with g = F_c + (F_s - F_c) exp(-(v/v_s)^2) (Astrom, Canudas de Wit 2008,
-doi:10.1109/MCS.2008.929425), follow from the measured motion without a simulated loop, and F_c, F_s, v_s from the
-force. Mass, stiffness and damping of the bristles come from other experiments, see `presliding`.
+Where friction falls steeply no controller holds a constant speed, and `friction_velocity` has nothing to read. The
+motion itself goes through all those speeds: LuGre's bristles, dz/dt = v - sigma_0 |v| z / g(v) with
+g = F_c + (F_s - F_c) exp(-(v/v_s)^2) (Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425), follow from the motion
+that was measured, with no loop to be simulated, and F_c, F_s, v_s from the force they have to make up. Mass, stiffness
+and damping of the bristles come from other experiments, see `presliding`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Analyse standstill in position: the deviation of a stage while its reference stands, compared between logs.
+"""Standstill in position: how far the stage wanders while its reference stands, and how logs of it compare.
 
 Thesis, Sec. 4.3.2, Fig. 28.
 """

@@ -1,8 +1,8 @@
-"""Analyse position steps with the cart fixed: stiffness of the joint.
+"""Position steps with the cart fixed: stiffness of the joint.
 
-Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator alone holds the joint, so differences of force over those of
-deflection are its stiffness, whatever constant force acts, and even if the cart creeps, provided that the deflection is
-measured.
+Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator holds the joint alone, so the differences of force over those of
+deflection are its stiffness, whatever constant force there is besides; and they are that even if the cart creeps, where
+the deflection is measured.
 """
 
 from __future__ import annotations
@@ -242,8 +242,9 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose position rests in several places, with forces that rise with the position, and a standing
-    reference.
+    """Claim a log whose position rests in several places, with a standing reference.
+
+    The force at these places rises with the position.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

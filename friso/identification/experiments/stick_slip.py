@@ -1,7 +1,7 @@
-"""Analyse slow motion on a free joint with a cart that sticks and slips: static friction.
+"""Slow motion on a free joint, the cart sticking and slipping: static friction.
 
-Thesis, Sec. 4.2.3, Fig. 20. While the cart sticks, the joint pulls at it with k_j times its growing deflection; at the
-peak the cart breaks away, and its velocity shows a spike.
+Thesis, Sec. 4.2.3, Fig. 20. While the cart sticks the joint pulls at it with k_j times its deflection, and more and
+more; at the peak the cart breaks away, and its velocity shows a spike.
 """
 
 from __future__ import annotations

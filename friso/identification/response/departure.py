@@ -1,4 +1,4 @@
-"""Where a measured response leaves a linear model at low frequency, and whether friction explains it."""
+"""Find where a measured response leaves a linear model at low frequency, and whether friction explains it."""
 
 from __future__ import annotations
 
