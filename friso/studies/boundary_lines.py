@@ -122,7 +122,10 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 
 
 def place_verdicts(result: Diagram) -> list[str]:
-    """Return the verdicts at stages spaced evenly over the range, by simulations and by all branches that reach them."""
+    """Return the verdicts at stages spaced evenly over the range.
+
+    They are by simulations and by all branches that reach them.
+    """
     verdicts = _verdicts(result)
     return [
         ATTRACTS if _attracts_at(result, place) else verdict
