@@ -33,8 +33,9 @@ class Damping:
 
     @property
     def worth(self) -> int:
-        """Return the number of the smallest damping that gives nearly all of the possible margin, 0 for the stage's
-        own.
+        """Return the index of the smallest damping that gives nearly all of the possible margin.
+
+        Index 0 is the stage's own damping.
         """
         settings = DesignSettings.current()
         return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])
