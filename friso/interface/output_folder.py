@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger("friso")
 
 STORE_MAKER = "map, a store"
-"""Maker of a folder that is a store and not a folder of files."""
+"""Maker recorded for a folder that is a store rather than a folder of files."""
 
 MARKER = ".friso-output"
-"""The file that records which command made a folder, and which files there are friso's."""
+"""Name of the file that records which command made a folder, and which of its files are friso's."""
 
 OVERWRITE, REPLACES = "--overwrite", "which replaces files of the same name"
-"""The option by which a command writes among files of others, and what that does."""
+"""Option by which a command may write among other files, and its effect in words."""
 
 UNFINISHED = ".friso-unfinished"
-"""The folder in which a long command keeps what is done until all is."""
+"""Name of the folder in which a long command keeps finished parts until it has ended."""
 
 
 class OutputFolder:
