@@ -15,10 +15,10 @@ from friso.studies.settings import StudySettings
 COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
 
 BINS = 24
-"""Bars of the figure."""
+"""Number of bars in the histogram."""
 
 MOST_LISTED = 4
-"""Most keys whose influence on the verdict the table lists."""
+"""Largest number of keys whose influence on the verdict the table lists."""
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:

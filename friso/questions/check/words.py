@@ -44,7 +44,7 @@ _UNFINISHED = (
     "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
     "that was found."
 )
-"""That what a stage does in the end is not known."""
+"""Sentence for a stage whose final behaviour is not known."""
 
 IN_SHORT: Mapping[Verdict, str] = {
     "hunts": "hunts",
@@ -55,10 +55,10 @@ IN_SHORT: Mapping[Verdict, str] = {
 """Words for the verdict on a case before its margin is known."""
 
 ONE_PLACE = 1.01
-"""Factor between the ends of a window below which it is told by its middle and its width."""
+"""Ratio of the ends of a window below which it is stated by its centre and width."""
 
 ROUGH = 5e-4
-"""Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
+"""Relative reserve of an edge from which it is mentioned, because the digits shown are then not certain."""
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:

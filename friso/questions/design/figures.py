@@ -39,13 +39,15 @@ from friso.shown.drawing.figure import (
 from friso.shown.drawing.prefixes import listed
 
 CHOSEN = "#e3001b"
-"""The marker of what was chosen, as that of an evaluation point in maps."""
+"""Colour of the chosen design's marker, as of an evaluation point in maps."""
 
 WIDE, FEW = 30.0, 0.01
-"""Settling times more than so many times as long as the share of the shortest are drawn on a logarithmic axis."""
+"""Conditions for a logarithmic axis of settling times.
+
+It is used if the longest time exceeds `WIDE` times the quantile `FEW`."""
 
 SHARES = 401
-"""Points of a distribution."""
+"""Number of points of a distribution."""
 
 CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
 

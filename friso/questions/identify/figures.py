@@ -26,7 +26,7 @@ SHORT = {
     "joint.stiffness": "joint k",
     "joint.damping": "joint d",
 }
-"""Keys of the stage file in the room that there is beside an axis."""
+"""Short names of keys for the limited room beside an axis."""
 
 
 def identify_figures(identification: Identification, predictions: Sequence[Prediction]) -> list[Figure]:

@@ -36,10 +36,10 @@ FORCE = "force"
 """Name of the figure that opens the page."""
 
 WORST = 5.0
-"""How much worse a fit is seen in a profile, in units of what ends the 95 % interval."""
+"""Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
 
 WIDE = 8.0
-"""Ratio of the ends from which a profile has a logarithmic axis."""
+"""Ratio of its ends above which a profile has a logarithmic axis."""
 
 LONG = 40.0
 """Length of the force record at the head of the page, in periods of the motion's bandwidth."""

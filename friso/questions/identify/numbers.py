@@ -12,19 +12,19 @@ from friso.questions.map.words import quantity
 from friso.shown.drawing.prefixes import NOTHING, choose, pretty
 
 DIGITS = 2
-"""Significant digits of half an interval that are shown, and so of its value."""
+"""Significant digits of the half-width of an interval, which also set those of the value."""
 
 MOST = 4
-"""Significant digits of a number without interval."""
+"""Largest number of significant digits of a value without interval."""
 
 LARGE, SMALL = 4, 7
-"""Zeros before, and places behind the decimal point, from which on a number has an exponent."""
+"""Zeros before and decimals behind the point above which a number gets an exponent."""
 
 EXACT = 15
-"""Digits behind the first one that a number has at all."""
+"""Largest number of digits after the first one."""
 
 FORCES = (1e-2, 1e4)
-"""Between these, forces [N], and what is in newtons per something, have no prefix: they are compared with others."""
+"""Range of forces [N], and of quantities per newton, without an SI prefix; they are compared with each other."""
 
 _NAMES = {
     "bias.cart": "Constant force on the cart",

@@ -31,7 +31,7 @@ COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
 """Columns of the table of estimates."""
 
 LEFT = "not identified"
-"""Stands for the value of what the logs do not show."""
+"""Text in place of a value that the logs do not show."""
 
 NO_STAGE = (
     "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
@@ -44,7 +44,7 @@ NO_NEWTONS = "No stage file is written: its keys need the force in {}."
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
 
 POOR = 0.5
-"""Relative error of the force, or of a response, from which on little of another log is predicted."""
+"""Relative error of force or response above which the prediction of another log is called poor."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _why_no_stage(identification: Identification) -> str:
 
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
-"""Keys that are usually 0: an interval that holds that shows no such effect."""
+"""Keys that are usually 0; an interval that contains 0 shows no effect."""
 
 
 def _absent(estimate: Estimate) -> bool:

@@ -12,7 +12,7 @@ from friso.questions.logs.words import title
 from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
 
 MOST = 12
-"""Channels of a file that are drawn."""
+"""Largest number of channels of a file that are drawn."""
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:

@@ -17,7 +17,7 @@ COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""
 
 PLAIN = 1e7
-"""Numbers below this one stand without an exponent."""
+"""Numbers below this are written without an exponent."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 

@@ -36,16 +36,16 @@ from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Colours of remedies that have settings, in order; further ones begin again, dashed."""
+"""Colours of remedies with settings, in order; further remedies repeat them, dashed."""
 
 SAMPLES = 4000
-"""Samples of a time response."""
+"""Number of samples of a time response."""
 
 SHOWN = 3.0
-"""The responses are drawn for so many times as long as the slowest twentieth of machines takes with what works."""
+"""Duration of drawn responses, relative to the settling time that 95 % of machines reach with a working remedy."""
 
 RTOL = 1e-7
-"""Relative tolerance of the responses that are drawn."""
+"""Relative tolerance of drawn responses."""
 
 
 def tune_figures(tuning: Advice) -> list[Figure]:

@@ -70,7 +70,7 @@ OPTIONS = {
 ABSENT = "never"
 
 NONE_FOUND = "none was found that surely works"
-"""Said of a remedy whose settings meet the goal on the machines of the search, but not surely on others."""
+"""Sentence on a remedy whose settings meet the goal for the machines of the search, but not surely for others."""
 
 LOCKED = "joint.locked"
 

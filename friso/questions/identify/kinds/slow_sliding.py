@@ -17,7 +17,7 @@ from friso.questions.identify.numbers import with_interval
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 
 POINTS, CURVE = 5000, 200
-"""Points of a record of slow sliding, and of the curve at steady velocities, that are drawn."""
+"""Numbers of points drawn: of a record of slow sliding, and of the curve at steady velocities."""
 
 
 def _facts(result: SlowSliding) -> Facts:

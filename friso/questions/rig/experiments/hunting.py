@@ -41,7 +41,7 @@ COLOURS = {"locked": VERMILLION, "free": BLUE}
 AREAS = {"locked": "#f6dccb", "free": "#cfdfee"}
 LINES = (GREY, GREEN, VERMILLION, ORANGE, PINK, SKY, BLUE, INK, GREY)
 AFTERWARDS = 5.0
-"""From where on [s] what is left of the move decides the height of a panel."""
+"""Time [s] after which the remaining deviation sets the height of a panel."""
 
 
 def rails_text(share: Share, count: int) -> str:
