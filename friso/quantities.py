@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
-    """Write a share in percent to some digits; a dash for none, 0 for mere rounding."""
+    """Write a fraction in percent to some digits; a dash for none, 0 for mere rounding."""
     if not math.isfinite(share):
         return NOTHING
     share = share if abs(share) > ROUNDING else 0.0

@@ -41,7 +41,7 @@ class RunOptions:
     """Options of runs.
 
     - Relative tolerance, step budget, and number of threads.
-    - Bands of settling [m]; start of the window for extremes, as a share of the run.
+    - Bands of settling [m]; start of the window for extremes, as a fraction of the run.
     - Time [s] from which turning points are kept, at most half of the run.
     - Smallest swing [m] between two of them, one number or one per run: smaller legs of a zigzag are skipped.
     - Room for turning points at first.

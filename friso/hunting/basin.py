@@ -272,7 +272,7 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
 def moves_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Estimate the share of moves around the stage's own that end in the `target`.
+    """Estimate the fraction of moves around the stage's own that end in the `target`.
 
     Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
     motions that are no moves, or if every run fails.

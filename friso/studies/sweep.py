@@ -59,7 +59,7 @@ def sweep(
     it is not certain); and the verdict on the stage ("hunts", "bistable", "transient", "settles" or "failed"). The
     attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
 
-    An outcome is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
+    An outcome is as good as its tolerance: with `verify` that fraction of the cells is run again at rtol/100, and the
     attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the
     grid is made four times finer, of which a fifth is run, along the changes of outcome (and of verdict, if it is asked
     for); the other cells are inferred, which their status says. With `store`, a folder, results are written there in

@@ -68,7 +68,7 @@ def describing(
     of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
     harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
     itself; the others come from `samples` samples of the period, whose accuracy `aliasing` estimates: by how much the
-    first harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled,
+    first harmonic from the samples differs from the integrated one, as a fraction of it (NaN if nothing was sampled,
     which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
     Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics, samples or an `rtol` that

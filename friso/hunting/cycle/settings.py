@@ -38,7 +38,7 @@ class OrbitSettings(Settings):
     """Distances between which a fixed point of the map is bracketed for Newton's method."""
 
     unwinding_wait_share: float = setting(0.4, "waits")
-    """Time from landing until the actuator only balances constant forces, as a share of the wait."""
+    """Time from landing until the actuator only balances constant forces, as a fraction of the wait."""
 
     almost_return_log: float = setting(0.03, "")
     """Largest error of a return that serves as the guess of a cycle."""

@@ -67,6 +67,6 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 def _longest(response: FrequencyResponse, share: float) -> float:
     """Return the sample time [s] of a response.
 
-    If it is not known, return a share of the period of the highest frequency.
+    If it is not known, return a fraction of the period of the highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

@@ -83,7 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the share of the departure from the mass line that the simulation does not explain."""
+    """Return the fraction of the departure from the mass line that the simulation does not explain."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

@@ -85,7 +85,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say first of all where the loop is unstable, whatever the friction, and where the drive makes it so."""
+    """State where the loop is unstable even without friction, and where the drive makes it unstable."""
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -145,7 +145,7 @@ def _hunting(case: Case) -> str:
 def _bistable(case: Case) -> str:
     """Describe a case that settles after this move but hunts after others.
 
-    The sentence names the smallest kicks and the share of moves that start hunting.
+    The sentence names the smallest kicks and the fraction of moves that start hunting.
     """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
@@ -218,7 +218,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say that the force limit keeps the stage where it stands, if it does."""
+    """Say whether the force limit keeps the stage at its place."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)
@@ -318,7 +318,7 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _unsearched(case: Case) -> list[str]:
-    """Say that the search through the bandwidths was given up, if it was."""
+    """Say that the search through the bandwidths was stopped, if it was."""
     if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
@@ -504,7 +504,7 @@ def _swing(case: Case) -> str:
 
 
 def _end(case: Case) -> str:
-    """Write what is left of the motion in the last quarter of the run."""
+    """Write the residual motion in the last quarter of the run."""
     if case.peak_to_peak < _TEN_MICRON:
         return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
     if not case.period:

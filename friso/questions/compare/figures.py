@@ -93,7 +93,7 @@ def _bars(
 
 
 def _settling(comparison: Comparison, within: str) -> Panel:
-    """Return the panel of the share of machines in position over the time since the move."""
+    """Return the panel of the fraction of machines in position over the time since the move."""
     flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
     times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]

@@ -25,7 +25,7 @@ from friso.shown.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
-    """Return the whole design except its files; of one that was interrupted, what is decided."""
+    """Return the whole design except its files; of an interrupted design, what is decided."""
     if isinstance(design, UnfinishedDesign):
         return plain_json(
             {

@@ -89,7 +89,7 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
-    """Return the share of a mode's kinetic energy that its picture shows.
+    """Return the fraction of a mode's kinetic energy that its picture shows.
 
     This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
     """

@@ -18,7 +18,7 @@ UNKNOWN = "unknown"
 
 
 def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
-    """Return the rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
+    """Return the rows: stiffnesses, eigenfrequencies, and the loads that the leaves can bear."""
     models = list(flexure.models.values())
     above, below = (
         [(name, [text(evaluation) for evaluation in models]) for name, text in part.items()]

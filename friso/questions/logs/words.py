@@ -57,7 +57,7 @@ def conclusions(content: LogContent) -> list[tuple[str, str]]:
 
 
 def open_questions(content: LogContent) -> list[str]:
-    """Say what has to be told, each in a sentence with the option that tells it."""
+    """Say what the user must state, each in a sentence with its option."""
     return [
         f"{gap.key}: {gap.expected}; given: {gap.actual}" + (f"; for example {gap.example}" if gap.example else "")
         for gap in content.gaps
@@ -95,7 +95,7 @@ def _range(channel: ChannelContent) -> str:
 
 
 def _number(value: float) -> str:
-    """Write four digits, without an exponent where a plain number is as short to read."""
+    """Write four digits, without an exponent where a plain number is as short."""
     text = f"{value:.4g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
 

@@ -134,7 +134,7 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _settling(tuning: Advice, lines: Lines) -> Panel:
-    """Return the panel of the share of machines in position over the time since the move."""
+    """Return the panel of the fraction of machines in position over the time since the move."""
     flat = tuning.stage.flat()
     drawn = [(outcome.measured if outcome else tuning.present, line) for _, outcome, line in lines]
     longest = max(

@@ -141,7 +141,7 @@ class RailRuns:
     - `outcome`: words of `friso.hunting.criteria.run_outcome`, with `BAND` as band.
     - `swing` [m], peak to peak, and `period` [s] of the last quarter (NaN: none).
     - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
-    - `rising`: share of the period in which the deviation rises.
+    - `rising`: fraction of the period in which the deviation rises.
     - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: of the heights over the swing
       (NaN with fewer than three swings).
 

@@ -101,7 +101,7 @@ def _free(guideline: Guideline) -> Figure:
 
 
 def _stroke(guideline: Guideline) -> Figure:
-    """Return the share of a joint's effect that is left with its stroke."""
+    """Return the fraction of a joint's effect that is left with its stroke."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
     joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2

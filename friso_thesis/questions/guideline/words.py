@@ -67,7 +67,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def log_error(off: float) -> str:
-    """Return an error of a logarithm as a share: 0.1 is 11 %."""
+    """Return an error of a logarithm as a fraction: 0.1 is 11 %."""
     return f"{percent(math.expm1(off))}"
 
 

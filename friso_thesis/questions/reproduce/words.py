@@ -59,7 +59,7 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """In how many draws it holds, and the interval of the share."""
+    """In how many draws it holds, and the interval of the fraction."""
     if verdict.space is None:
         return ""
     space = verdict.space

@@ -1,4 +1,4 @@
-"""What `friso rig stroke-crossover` shows: Fig. 26 of the thesis, in each cell the share of rails with peaks."""
+"""What `friso rig stroke-crossover` shows: Fig. 26 of the thesis, in each cell the fraction of rails with peaks."""
 
 from __future__ import annotations
 

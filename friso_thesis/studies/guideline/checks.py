@@ -14,7 +14,7 @@ from friso_thesis.studies.guideline.persistence import DISTANCES, Begin, from_re
 from friso_thesis.studies.guideline.sweeps import Sweep
 
 BELOW, ABOVE = 0.9, 1.15
-"""Crossovers at which is simulated, as shares of the edge."""
+"""Crossovers at which is simulated, as fractions of the edge."""
 
 MOVES = 16
 """Moves tried of each sample."""

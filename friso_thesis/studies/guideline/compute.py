@@ -39,7 +39,7 @@ from friso_thesis.studies.guideline.worked import Worked, friction_range, worked
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 SAMPLES = 512
-"""Default number of samples for the fit of the locked law; the other sweeps are shares of it."""
+"""Default number of samples for the fit of the locked law; the other sweeps are fractions of it."""
 
 FEWEST, MOST = 64, 65536
 """Fewer samples do not determine the exponents of a law; more exceed what Sobol points gain here."""

@@ -40,7 +40,7 @@ SCALE = 0.1
 """Error of the logarithm from which on the loss grows linearly instead of with the square."""
 
 FOLDS, GAIN, MOST = 8, 0.02, 8
-"""Parts of the cross-validation, share by which an exponent has to lower its loss, and exponents at most."""
+"""Parts of the cross-validation, fraction by which an exponent has to lower its loss, and exponents at most."""
 
 SampleValues = Mapping[str, np.ndarray]
 

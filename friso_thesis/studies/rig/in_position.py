@@ -90,7 +90,7 @@ class InPosition:
 
     @property
     def recovered(self) -> np.ndarray:
-        """By damping the share of the difference in RMS between the joint free and locked that it takes away."""
+        """By damping the fraction of the difference in RMS between the joint free and locked that it takes away."""
         locked, free = (self.runs[case, "all"].true[0, 0] for case in CASES)
         return (free - self.damped.true[:, 0]) / (free - locked)
 

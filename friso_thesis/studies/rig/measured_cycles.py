@@ -53,7 +53,7 @@ STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75,
 """Friction levels over those of the stage, on an even rail: our choice."""
 
 STARTS = (0.0, 0.005, 0.01, 0.02)
-"""Starts of a cycle: the move (0), or a release from this share of its distance."""
+"""Starts of a cycle: the move (0), or a release from this fraction of its distance."""
 
 LONGER = 1.5
 """Over the time of other runs: slow cycles shall come often enough."""
@@ -115,7 +115,7 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the share that still swings
+        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the fraction that still swings
         when the run ends, and the median of the periods over that of the even rail."""
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):

@@ -1,4 +1,4 @@
-"""On which share of rails peaks are counted, over stroke and crossover.
+"""On which fraction of rails peaks are counted, over stroke and crossover.
 
 Thesis, Fig. 26.
 """
@@ -47,7 +47,7 @@ class StrokeCrossover:
 
     @property
     def share(self) -> np.ndarray:
-        """Return the share of rails on which peaks are counted, shape (strokes, crossovers);
+        """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers);
         NaN where all runs failed."""
         done = ~self.runs.failed
         count = done.sum(axis=2)

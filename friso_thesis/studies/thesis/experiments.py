@@ -50,7 +50,7 @@ FORCE = 5.0
 that it finds."""
 
 RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
-"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the share of it
+"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the fraction of it
 that is Coulomb friction (as in Table 2): number and share are our choice."""
 
 FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)

@@ -67,7 +67,7 @@ class MetPart:
 class ClaimInSpace:
     """A claim over joint draws.
 
-    `seeds` (seed, number) are those of the draws. `holds` is the share of them in which it holds, `parts` those in
+    `seeds` (seed, number) are those of the draws. `holds` is the fraction of them in which it holds, `parts` those in
     which each part does. `hangs_on` are the values on which that depends, the most decisive first. `failures` say, by
     the number of the draw, why it could not be computed.
     """
@@ -239,7 +239,7 @@ def _met(column: Sequence[bool | None], count: int) -> MetPart:
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """Return the share of `count` draws, those beyond the flags being undecided."""
+    """Return the fraction of `count` draws, those beyond the flags being undecided."""
     missing = count - len(flags)
     return share(
         np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))

@@ -20,13 +20,13 @@ class WordReading:
 
     - The factor within which a number is `about` another. The factor within which it is `of the order` of another, and
       beyond which it is far below it.
-    - The share of a map's cells up to which they are `few`.
+    - The fraction of a map's cells up to which they are `few`.
     - The rank correlation (Spearman) from which there is a `trend`.
     - The share within which numbers are the `same`, and within which they are `close`, as far as one reads them off a
       figure.
     - The damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied.
-    - The share that is at least `half` or “most” of them, and the share of the range of strokes from which they are
-      `long`.
+    - The fraction that is at least `half` or “most” of them, and the fraction of the range of strokes from which they
+      are `long`.
     - For cycles on the rig: the factor from which one is nearly `twice` as long as another, that within which swings
       are `similar`, and that from which their two sides are `unequal`.
     - The scatter of the period over its mean from which a cycle is less regular, `uneven`.

@@ -63,7 +63,7 @@ class Reproduction:
       were judged, which are finer if few values per axis were asked for.
     - The linear analysis of the rig, its curves over frequency in `bode`, and the experiments, each None if no claim of
       this run needs it. `experimented` names the experiments made.
-    - The map of Fig. 14B by relative tolerance. The shares of its cells with peaks at one tolerance only, and with a
+    - The map of Fig. 14B by relative tolerance. The fractions of its cells with peaks at one tolerance only, and with a
       different peak count (NaN if not computed).
     - A verdict per claim, and the claims over the joint draws of the values that the thesis leaves open.
     - The hunting cycles behind each map, by study name.

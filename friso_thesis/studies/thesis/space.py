@@ -39,7 +39,7 @@ class OpenValue:
     baseline: float
 
     def at(self, share: float) -> float:
-        """Return the value at a share of the way through its range."""
+        """Return the value at a fraction of the way through its range."""
         if self.scale == "either":
             return self.low if share < 0.5 else self.high
         if self.scale == "log":

@@ -207,9 +207,9 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 @judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     """Judge whether counted peaks mean a cycle:
-    the share of cells with peaks whose run still swings at its end.
+    the fraction of cells with peaks whose run still swings at its end.
 
-    By attraction, it is the share of decided cells that a cycle attracts, for every map.
+    By attraction, it is the fraction of decided cells that a cycle attracts, for every map.
     """
     words = reading()
     rows, counted, lasting = [], 0, 0

@@ -132,7 +132,7 @@ def force_swings(runs: ConstantSpeed) -> list[float]:
 
 
 def _swing_text(share: float) -> str:
-    """Such a share, to a hundredth of a percent: below that the force is steady."""
+    """Such a fraction, to a hundredth of a percent: below that the force is steady."""
     return percent(round(share, 4))
 
 
@@ -174,7 +174,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
 
 
 def _between(shares: list[float]) -> str:
-    """Return the least and the greatest of some shares."""
+    """Return the least and the greatest of some fractions."""
     return f"{_swing_text(min(shares))} to {_swing_text(max(shares))}" if shares else "of no pass"
 
 

@@ -35,13 +35,13 @@ def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
 
 
 def _beside(counted: tuple[int, int], threshold: float) -> str:
-    """Return that a share of rails is undecided if its interval holds the threshold, else an empty text."""
+    """Return that a fraction of rails is undecided if its interval holds the threshold, else an empty text."""
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""
 
 
 def _rails(counted: tuple[int, int]) -> str:
-    """On how many rails, with the interval of their share."""
+    """On how many rails, with the interval of their fraction."""
     low, high = share_interval(*counted)
     return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
 
@@ -113,7 +113,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """Return the share of rails over stroke and crossover."""
+    """Return the fraction of rails over stroke and crossover."""
     return judged_grid(evidence.experiments.grid)
 
 

@@ -29,8 +29,10 @@ TURNING = 0.05
 
 @dataclass(frozen=True)
 class Sticking:
-    """The sticks that end in break-away, each of shape (sticks,): their length [s], the share of the integral action in
-    the force at break-away, and its direction (1 or -1)."""
+    """The sticks that end in break-away, each of shape (sticks,).
+
+    They have a length [s], the fraction of the integral action in the force at break-away, and its direction (1 or -1).
+    """
 
     time: np.ndarray
     integral: np.ndarray
@@ -62,7 +64,7 @@ class Sticking:
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
-    """Sticking time and integral share at break-away, at both gaps."""
+    """Sticking time and integral fraction at break-away, at both gaps."""
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     why = (
         ""
@@ -93,7 +95,7 @@ def sticking(response: Response) -> Sticking:
     """Return the sticks of a response that end in a break-away after the time from which peaks
     count.
 
-    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the share of the
+    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the fraction of the
     integral action is taken where the friction force is largest within the stick, before it drops.
     """
     trace = response.trace

@@ -86,7 +86,7 @@ def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: fl
     """Return the real part [1/s] of the rightmost pole of the loop,
     with friction linearised at speeds (n,) [m/s].
 
-    The bristles have a share of the deflection that belongs to these speeds in steady state.
+    The bristles have a fraction of the deflection that belongs to these speeds in steady state.
     """
     law = law_of(flat)
     assert law is not None  # the rig has friction
