@@ -19,11 +19,11 @@ BASES = {
     "joint": "sqrt(k_j/m)",
     "stroke": "sqrt(F_s/(m S_j))",
 }
-"""Base of each rate, without its factor and powers [rad/s]."""
+"""Formula of each rate [rad/s], without its factor and powers."""
 
 
 RULE = 2.0
-"""Factor up to which multiples of the crossover may differ and still pass for one rule."""
+"""Largest ratio of multiples of the crossover that still count as one rule."""
 
 
 def formulas(guideline: Guideline) -> str:

@@ -23,20 +23,21 @@ from friso_thesis.studies.thesis.studies import STUDIES
 from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 DRAWS, EVERY = 48, 3
-"""Joint draws by default; of every third also linear analysis and experiments are made, which take longer than all the
-maps."""
+"""Default number of joint draws, and interval between draws with linear analysis and experiments.
+
+Analysis and experiments take longer than all maps."""
 
 POINTS = 21
-"""Values per axis of the maps of a draw, whatever those of the baseline have: limits are interpolated."""
+"""Values per axis of the maps of a draw, whatever those of the baseline; limits are interpolated."""
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
 
 MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
-"""Steps of the progress that the maps of a draw count, and its linear analysis and experiments."""
+"""Steps of progress for the maps of a draw, and for its linear analysis and experiments."""
 
 DOUBT = 0.05
-"""Probability of a separation by chance from which it is not reported, over all values of a claim together."""
+"""Probability of a chance separation above which it is not reported, over all values of a claim together."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
 """Parts of the evidence besides maps and responses."""

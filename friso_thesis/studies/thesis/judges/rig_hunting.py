@@ -25,11 +25,11 @@ _ASSUMED = (
 )
 
 _DEVIATIONS = 0.1e-6, 1e-6
-"""Peaks by Fig. 28 with the joint locked and free [m]."""
+"""Peak deviations in Fig. 28 with the joint locked and free [m]."""
 
 
 def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
-    """On how many runs peaks are counted, of how many."""
+    """Return the number of runs with counted peaks, and of all runs."""
     done = ~runs.failed[which]
     return int((runs.counted[which] & done).sum()), int(done.sum())
 
@@ -41,7 +41,7 @@ def _beside(counted: tuple[int, int], threshold: float) -> str:
 
 
 def _rails(counted: tuple[int, int]) -> str:
-    """On how many rails, with the interval of their fraction."""
+    """Write on how many rails peaks are counted, with the interval of their fraction."""
     low, high = share_interval(*counted)
     return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
 
@@ -273,7 +273,7 @@ def _sized(peaks: tuple[float, float]) -> bool:
 
 
 def _over_noise(standstill: InPosition) -> str:
-    """At which noises of the force the deviations are as measured."""
+    """Write at which force noises the deviations are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:

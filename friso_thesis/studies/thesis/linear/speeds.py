@@ -21,10 +21,10 @@ from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.settings import FrequencySettings
 
 SPEEDS = 257
-"""Speeds at which stability is looked at before the ends of its ranges are located."""
+"""Number of speeds at which stability is checked before range ends are located."""
 
 CROSSOVERS = 25
-"""Faster controllers that are tried on a cart that is not stable."""
+"""Number of faster controllers that are tried on an unstable cart."""
 
 
 @dataclass(frozen=True)
