@@ -355,7 +355,7 @@ def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], populat
 
 
 def _down(crossover: float) -> float:
-    """Round a crossover down to three digits."""
+    """Round a crossover [Hz] down to three digits."""
     step = 10 ** (np.floor(np.log10(crossover)) - 2)
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 

@@ -101,8 +101,9 @@ BLOCKS = (
 """Names of blocks of rows whose first row depends on the model; the buffer ends after the last."""
 
 ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", "stands_since", *LOOKED_UP, *FUNCTIONS))
-"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions. One more row
-behind those of the module stores since when the reference stands."""
+"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions.
+
+One further row holds the time since which the reference stands."""
 
 
 @dataclass(frozen=True)

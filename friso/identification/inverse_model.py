@@ -294,5 +294,5 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
 
 
 def _first(count: int, step: int) -> int:
-    """Return the first row that is kept, so that the last one is kept too."""
+    """Return the first row to keep when rows are thinned, so that the last one is kept too."""
     return (count - 1) % step

@@ -195,7 +195,7 @@ def predict(
 
 
 def _unpredictable(log: Log) -> InputError:
-    """The error for a log that no kind of experiment at hand predicts."""
+    """Return the error for a log that no available kind of experiment can predict."""
     needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
     expected = ", or ".join(needs)
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
@@ -211,7 +211,7 @@ def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
-    """Return for each log which keys of its set-up the stage does not have, in words."""
+    """Return for each log the keys of its set-up that the stage does not have, in words."""
     several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
         f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"

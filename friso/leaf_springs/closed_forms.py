@@ -104,7 +104,7 @@ def max_stress(mechanism: Mechanism, deflection: Any) -> Any:
 
 
 def shortening(mechanism: Mechanism, deflection: Any) -> Any:
-    """Return by how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
+    """Return how much closer the stage comes to the cart: 3 delta^2/(5 L)."""
     return 3 * deflection**2 / (5 * mechanism.length)
 
 

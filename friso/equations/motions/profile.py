@@ -200,7 +200,7 @@ class MoveProfile(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the pieces of all moves; the last one stands."""
+        """Return the pieces of all moves; during the last piece the reference stands."""
         return [piece for move, start, position in _moves(flat) for piece in corners(move, start, position)]
 
     @staticmethod

@@ -120,7 +120,7 @@ def sparkline(values: np.ndarray) -> str:
 
 
 def _holds(content: LogContent) -> str:
-    """Say what the file holds."""
+    """Say what a file holds."""
     if content.response is not None:
         frequency = content.response.frequency
         ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")

@@ -616,7 +616,7 @@ def window_facts(tuning: Advice) -> list[tuple[str, str]]:
 
 
 def _windows(outcome: RemedyOutcome) -> list[str]:
-    """Write the windows of a remedy's numbers."""
+    """Write the ranges in which a remedy's numbers work, each varied alone."""
     return [window_words(window, outcome) for window in outcome.windows]
 
 

@@ -91,8 +91,11 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 
 
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
-    """Return where the ranges of crossovers end, joint locked and free,
-    by the damping ratio of the mode; and whether one multiple of the crossover is a rule for all modes."""
+    """Say where the ranges of crossovers end, by the damping ratio of the mode.
+
+    They are given with the joint locked and free. It is also said whether one multiple of the crossover is a rule for
+    all modes.
+    """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
     if ratios and max(ratios) > RULE * min(ratios):

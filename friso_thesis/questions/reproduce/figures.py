@@ -1,4 +1,4 @@
-"""The figures of the thesis in its own arrangement, from a reproduction to plain data."""
+"""Draw the figures of the thesis in its own arrangement, from a reproduction."""
 
 from __future__ import annotations
 

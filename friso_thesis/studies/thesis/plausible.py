@@ -58,7 +58,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """In how many draws a part is `met`, and the `share` of draws."""
+    """A part of a claim: the number of draws in which it is `met`, and their fraction of all draws, `share`."""
 
     met: int
     share: Share
@@ -82,27 +82,27 @@ class ClaimInSpace:
 
     @property
     def undecided(self) -> int:
-        """In how many draws it could not be computed."""
+        """Return the number of draws in which the claim could not be computed."""
         return len(self.failures)
 
     @property
     def draws(self) -> int:
-        """Draws tried."""
+        """Return the number of draws tried."""
         return len(self.seeds)
 
     @property
     def misses(self) -> int:
-        """In how many draws it could be computed and does not hold."""
+        """Return the number of draws in which the claim could be computed and does not hold."""
         return self.draws - self.undecided - self.count
 
     def met(self, part: int) -> int:
-        """In how many draws a part holds."""
+        """Return the number of draws in which a part holds."""
         return self.parts[part].met
 
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that the thesis prints for a claim, the criterion it belongs to, and what a draw has."""
+    """A number that the thesis prints for a claim, its criterion, and its value in a draw."""
 
     claim: str
     criterion: str
@@ -210,11 +210,12 @@ def _failure(error: Exception) -> Finding:
 
 
 FAILED = "failed"
-"""Stands after the name of a claim that cannot be computed."""
+"""Suffix of the name of a claim that cannot be computed."""
 
 _SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
-"""What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
-not taken for it."""
+"""Errors that mean that an experiment on a drawn rig shows nothing, such as a loop that stops.
+
+Errors of the program are of other types."""
 
 
 def _in_space(
@@ -299,7 +300,7 @@ def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
 
 
 def _misfit(numbers: Sequence[PrintedNumber]) -> float:
-    """Root mean square of ln(found/printed); infinite where one is not found at all."""
+    """Return the root mean square of ln(found/printed); infinite if a number is not found."""
     ratios = np.array([item.read / item.printed for item in numbers], float)
     if not ratios.size or not (np.isfinite(ratios) & (ratios > 0)).all():
         return np.inf

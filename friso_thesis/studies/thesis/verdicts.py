@@ -13,8 +13,9 @@ from friso_thesis.studies.thesis.plausible import ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
 
 ROBUST = 0.25
-"""Share of the space in which a claim may hold after all, up to which its contradiction is called robust: 13 draws
-without it."""
+"""Largest fraction of the space in which a claim may hold while its contradiction is called robust.
+
+Thirteen draws in which it does not hold show that."""
 
 NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
@@ -69,7 +70,7 @@ class ClaimVerdict:
 
     @property
     def dependence(self) -> str:
-        """In which fraction of the draws it holds, and on what that depends."""
+        """Say in which fraction of the draws a claim holds, and on what that depends."""
         if self.finding is None:
             return ""
         if self.space is None:
