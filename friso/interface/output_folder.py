@@ -213,10 +213,10 @@ def output_folder(
 
 
 def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
-    """Write files, all of them or none at any moment, and return their paths.
+    """Write files so that at any moment all or none are in place, and return their paths.
 
-    Files that `may_replace` does not name have to be new. Raises FileExistsError if one is not, and another OSError if
-    it cannot be written.
+    Files that `may_replace` does not name must be new. Raises FileExistsError if one is not, and another OSError if it
+    cannot be written.
     """
     with drafts_of(files, progress) as drafts:
         drafts.put_in_place(may_replace)

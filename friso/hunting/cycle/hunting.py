@@ -276,9 +276,10 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 
 
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Return why something may attract stages in which the survey found no attractor, words (count,); "" for no reason.
+    """Return why something may attract stages in which the survey found no attractor, as texts (count,).
 
-    `farther`, (count,), marks stages that may swing on from farther off than was tried.
+    A text is "" without a reason. `farther`, (count,), marks stages that may keep swinging from larger distances than
+    were tried.
     """
     settings = OrbitSettings.current()
     if stages.outer_integrals:

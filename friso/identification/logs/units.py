@@ -39,7 +39,7 @@ RESPONSES = tuple(
 )
 """Units of frequency responses: positions and their rates over forces, or over substitutes of forces."""
 _SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
-"""friso's units by their usual spellings."""
+"""The units that friso knows, by their usual spellings."""
 _MEGA = 1e5
 """Factor above which a unit is a misspelling: no log is in megametres, megaseconds or gigaradians."""
 _GLUED = re.compile(

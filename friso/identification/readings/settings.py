@@ -169,7 +169,7 @@ class ReadingSettings(Settings):
     """Power over the median from which a spectral line is no noise."""
 
     samples_in_common: int = setting(16, "")
-    """Fewest samples of each pass on the common way."""
+    """Fewest samples of each pass on the stretch that all passes cover."""
 
     share_in_common: float = setting(0.5, "")
     """Shortest common way, relative to the shortest pass."""

@@ -1,7 +1,7 @@
 """Choose sizes, durations and places of the experiments from the stage.
 
-Times are in periods of the controller's crossover, ways in those of the stage's own motion, deflections in strokes,
-forces in those of friction. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they are as in the thesis.
+Times are in periods of the controller's crossover, distances in lengths of the stage's own motion, deflections in
+strokes, and forces in friction forces. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) the values are those of the thesis.
 """
 
 from __future__ import annotations

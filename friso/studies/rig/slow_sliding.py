@@ -29,7 +29,7 @@ UNSTEADY, STEADY, PLACES = 2, 1, 8
 travel, because each log shows the friction of a few millimetres."""
 
 APART = 4
-"""Stride through the speeds, from the lowest on, if all were steady."""
+"""Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
 
 POINTS = 500
 """Points of a way for its mean friction."""

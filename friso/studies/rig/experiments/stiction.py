@@ -26,8 +26,10 @@ RAILS = 10
 """Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""
 
 LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
-"""Periods of the crossover in which the joint is loaded up to friction (2 s on the thesis's rig: 0.63 mm/s), for which
-the reference stands between velocities, and samples of the log per period (1 ms)."""
+"""Timing of the experiment in periods of the crossover, and samples of the log per period.
+
+The joint is loaded up to the friction force in the first time (2 s on the thesis's rig, at 0.63 mm/s). The reference
+stands for the second time between velocities. Samples are 1 ms apart on the thesis's rig."""
 
 SLIPS = 8
 """Loads of the joint in each leg."""
