@@ -124,7 +124,7 @@ class ResponseSettings(Settings):
     """Change between periods from which a slip of the generator's clock is looked for."""
 
     growth_of_a_slip: float = setting(2.0, "")
-    """Factor on that change after two periods. A slip changes four times as much."""
+    """Least ratio of the change after two periods to that after one. A slip changes four times as much."""
 
     # Averages over periods and realisations.
     lines_sharing_variance: int = setting(5, "")
