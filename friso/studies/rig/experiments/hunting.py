@@ -1,4 +1,4 @@
-"""Run a move at several crossovers, with the joint locked and free.
+"""A move at several crossovers, with the joint locked and free.
 
 Thesis, Fig. 24, 25; on the stage's rail and on repeated ones.
 """

@@ -1,4 +1,4 @@
-"""Measure bristles by small motion before sliding, and force over displacement in loops up to break-away.
+"""Stiffness and damping of the bearing's bristles by small motion before it slides, and loops up to break-away.
 
 The loops tell friction laws apart. The joint is locked. The thesis has no such experiment, but the bristles decide
 whether a machine near the boundary of hunting hunts.

@@ -1,4 +1,4 @@
-"""Measure static friction by stick-slip in slow motion, with the joint free.
+"""Static friction by stick-slip in slow motion.
 
 Thesis, Sec. 4.2.3, Fig. 20.
 """
