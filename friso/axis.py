@@ -1,6 +1,9 @@
-"""Linear and rotary axes. Everything is declared in the units of a linear axis; on a rotary one angles stand for
-lengths, torques for forces and moments of inertia for masses, in the same equations. Every text of a unit comes from
-here: of keys (`AxisKind.unit`), and of whatever is shown (`unit_shown`, of the axis that a command speaks of)."""
+"""Linear and rotary axes, and their units.
+
+Everything is declared in the units of a linear axis. On a rotary axis angles stand for lengths, torques for forces, and
+moments of inertia for masses, in unchanged equations. Every text of a unit comes from this module: units of keys
+(`AxisKind.unit`), and units shown for the axis of the current command (`unit_shown`).
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 AXIS_KIND = "axis.kind"
-"""Stage-file key."""
+"""Stage-file key of the kind of axis."""
 
 LENGTH, FORCE, MASS = "m", "N", "kg"
 
@@ -33,12 +36,12 @@ class AxisKind:
 
     @property
     def described(self) -> str:
-        """In a message about a unit."""
+        """Return the axis in words, for a message about a unit."""
         return f'[axis] kind = "{self.name}"'
 
     @property
     def plain(self) -> bool:
-        """Whether units are those that everything is declared in."""
+        """Tell whether units are those of a linear axis, in which everything is declared."""
         return (self.length, self.force) == (LENGTH, FORCE)
 
     def per(self, unit: str) -> AxisKind:
@@ -62,7 +65,7 @@ class AxisKind:
         return sentence if self.plain else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
 
     def with_units(self, dataset: Any) -> Any:
-        """Return an xarray.Dataset in the units of this axis; it comes in those of a linear one."""
+        """Return an xarray.Dataset, given in the units of a linear axis, in the units of this axis."""
         for array in dataset.variables.values():
             array.attrs.update({key: self.unit(array.attrs[key]) for key in ("units",) if key in array.attrs})
             array.attrs.update({key: self.text(array.attrs[key]) for key in ("criterion",) if key in array.attrs})
@@ -90,7 +93,7 @@ _SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
 
 
 def _in_key(unit: str) -> str:
-    """A unit as keys end with it: "kg*m^2" is "kg_m2"."""
+    """Return a unit as the suffix of a key: "kg*m^2" becomes "kg_m2"."""
     return unit.lower().replace("^", "").replace("*", "_").replace("/", "_per_")
 
 
@@ -100,7 +103,7 @@ KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
 
 
 def axis_of(flat: Mapping[str, Any]) -> AxisKind:
-    """The kind of axis of a stage given as flat keys."""
+    """Return the kind of axis of a stage given as flat keys."""
     return KINDS[flat.get(AXIS_KIND, LINEAR.name)]
 
 
@@ -108,13 +111,13 @@ _SPOKEN_OF: ContextVar[AxisKind] = ContextVar("axis", default=LINEAR)
 
 
 def speak_of(kind: AxisKind) -> None:
-    """Show everything in this context (`contextvars`) in the units of an axis from here on."""
+    """Show everything from here on, in this context (`contextvars`), in the units of an axis."""
     _SPOKEN_OF.set(kind)
 
 
 @contextmanager
 def speaking_of(kind: AxisKind) -> Iterator[None]:
-    """What is shown within is in the units of an axis of that kind."""
+    """Show everything in the `with` block in the units of an axis."""
     token = _SPOKEN_OF.set(kind)
     try:
         yield
@@ -123,12 +126,12 @@ def speaking_of(kind: AxisKind) -> Iterator[None]:
 
 
 def axis_shown() -> AxisKind:
-    """The kind of the axis that is spoken of."""
+    """Return the kind of axis whose units are shown."""
     return _SPOKEN_OF.get()
 
 
 def unit_shown(unit: str) -> str:
-    """The unit, on the axis that is spoken of, for one of a linear axis."""
+    """Return the shown unit for a unit of a linear axis."""
     return axis_shown().unit(unit)
 
 
@@ -159,4 +162,4 @@ _UNITS_IN_KEYS: Mapping[str, str] = {
         "db": "dB",
     },
 }
-"""Units as they stand at the ends of keys."""
+"""Units by their spelling at the ends of keys."""

@@ -1,4 +1,4 @@
-"""What is wrong with an input: one clear message, whoever reads it."""
+"""Errors about inputs: each states in one clear message what is wrong."""
 
 from collections.abc import Iterable
 from typing import Self
@@ -6,7 +6,7 @@ from typing import Self
 from friso.escapes import escaped, one_line
 
 _LONGEST = 1200
-"""Characters of a line that are shown, at most: longer ones come from no person, and hide what is wrong."""
+"""Largest number of characters shown of a line."""
 
 
 class InputError(ValueError):
@@ -46,7 +46,7 @@ class InputError(ValueError):
 
     @classmethod
     def of(cls, error: "InputError") -> Self:
-        """Make an error of this kind of another one; all that it says stays."""
+        """Return an error of this class with the contents of another one."""
         return cls(error.key, error.actual, error.expected, error.example, error.origin, error.also)
 
     def under(self, table: str) -> Self:
@@ -67,7 +67,7 @@ class InputError(ValueError):
 
 
 def shortened(text: str) -> str:
-    """A text whose lines are not longer than anyone reads."""
+    """Return a text with overlong lines cut."""
     return "\n".join(line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..." for line in text.split("\n"))
 
 

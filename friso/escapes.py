@@ -1,5 +1,7 @@
-"""Texts from files that are shown: no character of theirs may steer a terminal, turn the reading direction, or become a
-formula."""
+"""Escape texts from files before they are shown.
+
+Their characters must not control a terminal, reverse the reading direction, or become a formula.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +12,29 @@ _STEERING = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
     "\ud800-\udfff\U000e0000-\U000e007f]"
 )
-"""Control characters but for line feed and tab, marks and overrides of the direction of writing, characters without
-width, halves of surrogate pairs, tags."""
+"""Pattern of characters to escape.
+
+They are control characters except line feed and tab, marks and overrides of the writing direction, characters without
+width, surrogates, and tags."""
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
-"""How a cell begins that a spreadsheet takes for a formula; the last four are the wide forms of the first, which Excel
-takes in East Asian languages."""
+"""First characters of a cell that a spreadsheet reads as a formula.
+
+The last four are wide forms of the first four, which Excel accepts in East Asian languages."""
 
 
 def escaped(text: str) -> str:
-    r"""The text with each such character written out, "\x1b" or "\u202e"; lines stay lines."""
+    r"""Return a text with every unsafe character written out, such as "\x1b" or "\u202e"; lines are kept."""
     return _STEERING.sub(_written_out, text)
 
 
 def one_line(text: str) -> str:
-    r"""The text, escaped, on one line: line feeds and tabs are written out too."""
+    """Return a text escaped on one line; line feeds and tabs are written out as well."""
     return escaped(text).replace("\n", "\\n").replace("\t", "\\t")
 
 
 def table_cell(text: str) -> str:
-    """Return the text as a cell of a CSV file, escaped; a formula gets an apostrophe."""
+    """Return a text escaped as a cell of a CSV file; a formula gets a leading apostrophe."""
     return f"'{escaped(text)}" if text.startswith(_FORMULA) else escaped(text)
 
 

@@ -1,8 +1,8 @@
-"""Findings of our own computations that take too long to repeat where they are stated.
+"""Findings of friso's own computations that take too long to repeat where they are stated.
 
-A number that we computed ourselves is either computed where it is stated or kept in `evidence.toml`: with the
-command that computes it again, the date, the revision of the equations and a digest of the code it was computed with.
-``python -m benchmarks.evidence`` lists the entries, computes them again and says which are older than either.
+`evidence.toml` keeps them. Each has the command that computes it again, the date, the revision of the equations, and a
+digest of the code used. ``python -m benchmarks.evidence`` lists the entries, computes them again, and says which are
+older than equations or code.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Entry:
 
     @property
     def day(self) -> str:
-        """The day it was computed, as documents write it."""
+        """Return the day of the computation, as documents write it."""
         return f"{self.computed.day} {self.computed:%B %Y}"
 
 
@@ -59,13 +59,13 @@ class Equations:
 
 @cache
 def findings_on_file() -> Mapping[str, Entry]:
-    """All findings on file, by name."""
+    """Return all findings on file by name."""
     return {name: _entry(name, row) for name, row in _file()["finding"].items()}
 
 
 @cache
 def equations() -> Equations:
-    """The latest revision of the equations on file."""
+    """Return the latest revision of the equations on file."""
     row = _file()["equations"]
     return Equations(row["revision"], row["since"], row["numbers"])
 

@@ -1,7 +1,7 @@
 """Quantities with a range: "1 N .. 3 N", "1.7 kg +/- 5 %", "1.7 kg +/- 0.1 kg", or a single value.
 
-One grammar for two uses: a specification allows all of a range (`Span`), a key of a stage file is uncertain in it
-(`uncertain_value`).
+The notation has two uses. A specification allows every value of a range (`Span`). A key of a stage file is uncertain
+within it (`uncertain_value`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ WIDE = 10.0
 """Ratio of the ends of a range above which its order of magnitude counts as the uncertain quantity."""
 
 _BESIDE = 1e-6
-"""Share of the range beside its centre in which some number has to be allowed: of whole numbers none is."""
+"""Half-width of the neighbourhood of a range's centre in which some number must be allowed, relative to the range.
+
+A key that takes whole numbers fails the test."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Interval:
 
     @property
     def single(self) -> bool:
-        """Whether a single value was given, not a range."""
+        """Tell whether a single value was given instead of a range."""
         return self.form == "value"
 
     @property
@@ -49,17 +51,17 @@ class Interval:
 
     @property
     def wide(self) -> bool:
-        """Whether it is a range over orders of magnitude, whose logarithm is then taken as uniform."""
+        """Tell whether the range spans orders of magnitude, so that its logarithm is taken as uniform."""
         return self.form == "range" and self.low > 0 and self.high > WIDE * self.low
 
     def at(self, share: Any) -> Any:
-        """The values at shares, from 0 to 1, of the way from low to high."""
+        """Return the values at fractions, from 0 to 1, of the way from low to high."""
         return self.low + share * (self.high - self.low)
 
     def evenly(self, share: Any) -> Any:
-        """Return the values at shares, 0 to 1, of an uncertain quantity known to be within.
+        """Return the values of an uncertain quantity at quantiles from 0 to 1.
 
-        In a `wide` range the logarithm is uniform.
+        The quantity is uniform between its ends, or in its logarithm if the range is `wide`.
         """
         return self.low * (self.high / self.low) ** share if self.wide else self.at(share)
 
@@ -94,17 +96,17 @@ class Span:
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         unit = f"{self.of.unit}, " if self.of.unit else ""
         return f'a range "LOW .. HIGH" or "VALUE +/- TOLERANCE" ({unit}{self.of.bound.text}), or a single value'
 
     @property
     def written_example(self) -> str:
-        """The example as it stands in a file."""
+        """Return the example as it stands in a file."""
         return f'"{self.example}"'
 
     def read(self, entry: Any) -> Interval:
-        """The range of a text, all of it allowed. Raises InputError."""
+        """Return the range of a text, if the key allows all of it. Raises InputError."""
         if isinstance(entry, Interval):
             return entry
         try:
@@ -120,15 +122,15 @@ class Span:
 
 
 def is_range(value: Any) -> bool:
-    """Whether this is a text with one of the marks of a range."""
+    """Tell whether a value is a text with the notation of a range."""
     return isinstance(value, str) and any(mark in value for mark in _MARKS)
 
 
 def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
-    """The uncertain value of a text that `is_range`. Raises InputError.
+    """Return the uncertain value of a text that `is_range`. Raises InputError.
 
-    All of a range "LOW .. HIGH" has to be allowed. Of "VALUE +/- HALF" the value has to be: a normal distribution has
-    no ends, and what reaches beyond the bound is no mistake of the user; it is cut off where values are drawn.
+    All of a range "LOW .. HIGH" must be allowed. Of "VALUE +/- HALF" only the value must be: a normal distribution has
+    no ends, and draws are cut off at the bound.
     """
     try:
         centre, interval = _read(text, of)
@@ -146,7 +148,7 @@ def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
 
 
 class _Refused(Exception):
-    """Why a text is no range of a quantity; becomes the hint of a InputError."""
+    """Reason why a text is not a range of a quantity; it becomes the hint of an InputError."""
 
 
 def _reach(interval: Interval, of: Quantity | Number) -> str:
@@ -193,7 +195,7 @@ def _half_width(centre: float, tolerance: str, of: Quantity | Number) -> float:
 
 
 def _bare(value: Any) -> Any:
-    """The number in a text, or what was given."""
+    """Return the number in a text, or the value itself."""
     if not isinstance(value, str):
         return value
     try:

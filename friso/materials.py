@@ -34,7 +34,7 @@ class Material:
 
 @cache
 def materials() -> dict[str, Material]:
-    """All materials that are known, by name."""
+    """Return all known materials by name."""
     rows = tomllib.loads(files("friso").joinpath("materials.toml").read_text(encoding="utf-8"))["material"]
     return {row["name"]: _read(**row) for row in rows}
 

@@ -1,4 +1,4 @@
-"""How long work reports its progress: one signature, for studies and analyses."""
+"""Report the progress of long work: one signature for all studies and analyses."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called with the steps done, the total number of steps (0: unknown), and what is being done now."""
+    """Function called with the steps done, all steps (0: unknown), and a label of the current work."""
 
     def __call__(self, done: int, total: int, label: str, /) -> None: ...
 
 
 class _Silent:
-    """Progress that is not shown."""
+    """Progress without display."""
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
         pass
@@ -44,9 +44,9 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
 
 
 def between(progress: Progress, first: float, last: float, label: str = "") -> Progress:
-    """Return the progress of work that takes all work from one share to another, 0 to 1.
+    """Return the progress of a piece of work between two fractions, 0 to 1, of all work.
 
-    A `label` replaces the labels of the pieces.
+    A `label` replaces the labels of the piece.
     """
 
     def report(done: int, total: int, piece: str, /) -> None:
@@ -57,7 +57,7 @@ def between(progress: Progress, first: float, last: float, label: str = "") -> P
 
 
 PERCENT, FINELY = 100, 1000
-"""Steps as which a piece of work counts, one of equal ones and one of its own share."""
+"""Steps into which one of several equal pieces, and a piece of its own size, are divided."""
 
 
 class Tally:
@@ -78,7 +78,7 @@ class Tally:
 
 
 def together(progress: Progress, count: int) -> list[Progress]:
-    """Return the progresses of `count` equal pieces of work that are done side by side."""
+    """Return the progresses of `count` equal pieces of work that run in parallel."""
     tally = Tally(progress, PERCENT * count)
 
     def piece() -> Progress:
@@ -98,7 +98,7 @@ def together(progress: Progress, count: int) -> list[Progress]:
 class WorkClock:
     """A clock of work in seconds that can be stopped.
 
-    It stands still during what is done once, such as compiling, which does not tell how long the rest takes.
+    It is stopped during one-off work, such as compiling, which says nothing about the remaining time.
     """
 
     def __init__(self) -> None:
@@ -107,13 +107,13 @@ class WorkClock:
         self._turn = Lock()
 
     def now(self) -> float:
-        """The time [s] since any time before."""
+        """Return the time [s] since an arbitrary origin."""
         with self._turn:
             return (self._since if self._reasons else time.monotonic()) - self._stood
 
     @contextmanager
     def stands(self) -> Iterator[None]:
-        """Within, the clock stands still. Several threads may have it do so at once."""
+        """Stop the clock in the `with` block. Several threads may stop it at once."""
         with self._turn:
             if not self._reasons:
                 self._since = time.monotonic()
@@ -128,4 +128,4 @@ class WorkClock:
 
 
 WORK_CLOCK = WorkClock()
-"""The clock of the work that this process does."""
+"""The clock of the work of this process."""

@@ -21,19 +21,19 @@ from friso.errors import InputError
 from friso.escapes import toml_text
 
 LARGEST_INTEGER = 10**60
-"""Whole numbers from here on are not written out."""
+"""Whole numbers of this size or more are not written out."""
 
 
 NOTHING = "–"
-"""Stands where there is nothing to say."""
+"""Text in place of a missing value."""
 
 
 ROUNDING = 1e-9
-"""Share that is as good as none."""
+"""Fraction below which a value counts as 0."""
 
 
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
-    """Write a share in percent to some digits; a dash for none, 0 for mere rounding."""
+    """Write a fraction in percent to some digits; a dash for none, 0 for mere rounding."""
     if not math.isfinite(share):
         return NOTHING
     share = share if abs(share) > ROUNDING else 0.0
@@ -44,13 +44,13 @@ def percent(share: float, digits: int = 2, signed: bool = False) -> str:
 
 
 def plain_factor(factor: float) -> str:
-    """A factor to three significant digits, without an exponent."""
+    """Write a factor to three significant digits, without an exponent."""
     rounded = float(f"{factor:.3g}")
     return f"{rounded:.0f}" if abs(rounded) >= 1000 else f"{rounded:g}"
 
 
 def outwards(value: float, larger: bool) -> float:
-    """Three digits of a value, so that it is not met more tightly than it has to be."""
+    """Round a value to three digits, never towards the tighter side."""
     if value <= 0:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
@@ -59,7 +59,7 @@ def outwards(value: float, larger: bool) -> float:
 
 
 def as_toml(value: Any) -> str:
-    """How a scalar is written in TOML; anything else is named, not written out."""
+    """Return a scalar as it is written in TOML; other values are named instead."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -85,14 +85,14 @@ def quoted(value: Any, hint: str = "") -> str:
 
 
 LARGEST = 1e30
-"""More than any value of a machine is in SI; squares and products of such values can be computed with."""
+"""Bound on SI values: larger than any value of a machine, and small enough for squares and products."""
 
 BEYOND = "too large: beyond 1e30 in SI"
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Which numbers are allowed: in words, and as a test that broadcasts over arrays."""
+    """Allowed numbers: in words, and as a test that broadcasts over arrays."""
 
     text: str
     test: Callable[[Any], Any]
@@ -128,7 +128,7 @@ class Value(float):
 
 
 class Motor(NamedTuple):
-    """What an ampere exerts, and the unit of that: N, or N*m."""
+    """The force or torque per ampere of a motor, and its unit: N or N*m."""
 
     per_ampere: float
     force: str
@@ -150,7 +150,7 @@ class Quantity:
     motor: Motor | None = field(default=None, kw_only=True)
 
     def on(self, kind: AxisKind) -> Self:
-        """What the key takes on an axis of that kind."""
+        """Return the declaration of the key on an axis of that kind."""
         motor = None if kind.per_ampere is None else Motor(kind.per_ampere, kind.force)
         motor = None if self.unit.endswith("/A") else motor
         if (unit := kind.unit(self.unit)) == self.unit:
@@ -161,7 +161,7 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         units = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
         if self.motor and re.match(re.escape(self.motor.force) + r"\b", self.unit):
             units += f" or {self.unit.replace(self.motor.force, 'A', 1)}"
@@ -170,7 +170,7 @@ class Quantity:
 
     @property
     def written_example(self) -> str:
-        """The example as it stands in a file."""
+        """Return the example as it stands in a file."""
         return as_toml(self.example)
 
     def factor(self, unit: str) -> float:
@@ -184,7 +184,7 @@ class Quantity:
             raise InputError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
     def read(self, entry: Any) -> Value:
-        """The SI value of a text (or of the text of a Value). Raises InputError."""
+        """Return the SI value of a text, or of the text of a Value. Raises InputError."""
         text = getattr(entry, "text", entry)
         try:
             value = _read(text, self.unit, self.motor)
@@ -216,16 +216,16 @@ class Number:
 
     @property
     def expected(self) -> str:
-        """What the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         return f"a bare number without quotes, {self.bound.text}"
 
     @property
     def written_example(self) -> str:
-        """The example as it stands in a file."""
+        """Return the example as it stands in a file."""
         return self.example
 
     def read(self, entry: Any) -> float:
-        """What was given, checked. Raises InputError."""
+        """Return the given number, checked. Raises InputError."""
         is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
         if not is_number or not self.bound.holds(entry):
             beyond = is_number and LARGEST < abs(entry) < math.inf
@@ -237,7 +237,7 @@ class Number:
 
 
 class _Refused(Exception):
-    """Why a text is no value of a unit; becomes the hint of a InputError."""
+    """Reason why a text is not a value in a unit; it becomes the hint of an InputError."""
 
 
 # A strict grammar before pint sees anything: its parser would compute "m^(9^9^9)" and take "N;N" for N^2.
@@ -249,7 +249,7 @@ _LONGEST = 100
 
 
 def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
-    """Number times factor, in exact arithmetic: "30 ms" is the float 0.03. Raises _Refused."""
+    """Return number times factor in exact arithmetic: "30 ms" gives the float 0.03. Raises _Refused."""
     if isinstance(entry, int | float) and not isinstance(entry, bool):
         raise _Refused("a bare number without a unit")
     if not isinstance(entry, str):
@@ -268,7 +268,7 @@ def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
 
 
 def _split(entry: str) -> tuple[str, str]:
-    """Number and unit of a text. Raises _Refused."""
+    """Return number and unit of a text. Raises _Refused."""
     text = " ".join(entry.split())
     if len(text) > _LONGEST:
         raise _Refused("too long")
@@ -344,7 +344,7 @@ def si_value(text: str) -> float:
 
 
 TORQUES = ("newton_meter = newton * meter = Nm", "newton_centimeter = newton * centimeter = Ncm")
-"""Units of torque as they are written on motors."""
+"""Definitions of torque units as they are printed on motors."""
 
 
 @cache
@@ -388,11 +388,11 @@ def by_pint(unit: str) -> tuple[float, dict[str, float], list[str]]:
 
 _USUAL = ("Hz", "kHz", "N", "kN", "m", "mm", "um", "nm", "s", "ms", "us", "kg", "g", "Pa", "GPa", "rad", "deg", "rpm")
 _SPELLED = {name.lower(): name for name in _USUAL}
-"""How units are spelled that are often written with other capitals."""
+"""Usual spelling of units that are often written with other capitals."""
 
 
 def _meant(unit: str) -> str:
-    """The unit in the usual capitals, as a question; "" where it stands in them."""
+    """Return a hint with the usual capitals of a unit; "" if it has them."""
     spelled = re.sub(r"[^\W\d_]+", lambda name: _SPELLED.get(name[0].lower(), name[0]), unit)
     return f"; {spelled}?" if spelled != unit else ""
 
@@ -421,12 +421,12 @@ def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
 
 
 def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
-    """Whether a unit is one per angle whose radian was left out: N m for N m/rad."""
+    """Tell whether a unit per angle lacks the radian: N m for N m/rad."""
     return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
 
 
 def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -> bool:
-    """Tell whether a unit has amperes in place of forces: A/m for N/m, A*s^2/rad of an inertia."""
+    """Tell whether a unit has amperes in place of newtons: A/m for N/m, or A*s^2/rad for an inertia."""
     if root.get("ampere") != 1 or "ampere" in si_root:
         return False
     _, per_ampere, _ = _root(f"{force}/A")
@@ -436,12 +436,12 @@ def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -
 
 
 def _per_angle(root: dict[str, float], motor: Motor | None) -> bool:
-    """Whether a unit has amperes per angle, where a `motor` moves a linear axis."""
+    """Tell whether a unit has amperes per angle although a `motor` moves a linear axis."""
     return bool(motor and motor.force == "N" and root.get("ampere") == 1 and root.get("radian", 0) < 0)
 
 
 def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:
-    """A hint where a unit would do on a rotary axis; "" where it would not."""
+    """Return a hint if a unit would be valid on a rotary axis; "" if not."""
     turned = ROTARY.unit(si_unit)
     fits = turned != si_unit and root == _root(turned)[1]
     return f"; it would be of a rotary axis, {ROTARY.described}" if fits else ""

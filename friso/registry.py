@@ -1,4 +1,4 @@
-"""What modules declare, one each, by name: those of a folder of friso, and those that installed packages name."""
+"""Registries of what modules declare, by name, from a folder of friso and from installed packages."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ class Registry(Generic[Item]):
 
     @cached_property
     def _own(self) -> dict[str, str]:
-        """The modules of the package, by name."""
+        """Return friso's own modules by name."""
         modules = iter_modules(import_module(self.package).__path__)
         return {module.name.replace("_", self.dash): f"{self.package}.{module.name}" for module in modules}
 
     @property
     def installed(self) -> Mapping[str, str]:
-        """The modules that installed packages name, by name."""
+        """Return the modules of installed packages by name."""
         return installed_modules(self.group, frozenset(self._own)) if self.group else {}
 
     @property
     def others(self) -> list[str]:
-        """The names that friso does not have itself."""
+        """Return the names that do not belong to friso itself."""
         return sorted({*self.installed, *self.added})
 
     def __iter__(self) -> Iterator[str]:
-        """The names, in alphabetical order."""
+        """Yield the names in alphabetical order."""
         return iter(sorted({*self._own, *self.installed, *self.added}))
 
     def __contains__(self, name: object) -> bool:

@@ -98,7 +98,7 @@ class Settings:
 
 @cache
 def _defaults(settings: type[Any]) -> Any:
-    """Return the default values of a room, made once: code asks for them often."""
+    """Return the default values of a settings class; the result is cached."""
     return settings()
 
 

@@ -1,4 +1,4 @@
-"""Shares of runs, draws, machines or rails of which something holds, with their 95 % intervals."""
+"""Fractions of runs, draws, machines or rails with a property, and their 95 % intervals."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 DOUBT = 0.05
-"""Probability that lies outside an interval."""
+"""Probability outside an interval."""
 
 
 @dataclass(frozen=True)
 class Share:
     """The probability of an outcome, estimated from runs, with its 95 % interval.
 
-    The interval (Clopper, Pearson) holds whatever the runs that failed would have done. The probability is NaN if no
-    run tells.
+    The interval (Clopper, Pearson) holds whatever the outcome of failed runs would have been. The probability is NaN if
+    no run succeeded.
     """
 
     probability: float
@@ -24,9 +24,9 @@ class Share:
 
 
 def share(flags: np.ndarray, decided: np.ndarray) -> Share:
-    """Return the share of runs with `flags` set, among those that are `decided`.
+    """Return the fraction of runs with `flags` set, among those that are `decided`.
 
-    Both arrays have any one shape; undecided runs count either way in the interval.
+    Both arrays have any one shape. The interval allows for either outcome of undecided runs.
     """
     count, unknown = np.size(flags), int(np.count_nonzero(~decided))
     hits = int(np.count_nonzero(flags & decided))

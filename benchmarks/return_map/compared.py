@@ -37,20 +37,17 @@ def page(records: Sequence[Record]) -> str:
         f"Written by `python -m benchmarks.return_map --table docs/evidence/return-map.md`; answers of "
         f"{' to '.join(dict.fromkeys((days[0], days[-1])))}, stages of each series and seed: {drawn}.",
         "",
-        "Each case that may hunt was answered twice: by the check, which asks return maps where they go, and with "
-        "every bandwidth and kick searched by simulations. Of the cases that both are certain about, the table counts "
-        "verdicts that are the same; certain edges of the search within the interval that the check tells; windows of "
-        "the search in the middle of which the check has one, too; stages all of whose limits of kicks lie within "
-        f"{100 * KICK:g} %. The search may have been asked with earlier code (it was kept), and from a tenth of the "
-        "bandwidth on; what it found below a quarter is left out. The work of the check stands as a share of the "
-        "search's, and by itself, in 1e6 units (median, 95th percentile, most).",
+        "Each case that may hunt was answered by the check, which uses return maps, and by the search, which simulates "
+        "every bandwidth and kick (partly with earlier code). Of cases certain in both: equal verdicts; edges of the "
+        "search within the interval of the check; windows of the search that the check has, too; stages whose limits "
+        f"of kicks agree within {100 * KICK:g} %. Work: over that of the search, and in 1e6 units (median, 95th "
+        "percentile, largest). In brackets: the search.",
         "",
         *markdown(head, rows),
         "",
         "## What differs",
         "",
-        "Behind a difference stands what runs from 72 starts show, at the stage itself or between both edges, where "
-        "they were made (`--decide`).",
+        "With `--decide`, runs from 72 starts between both answers stand behind a difference.",
         "",
         *(f"- {_name(record)}: {text}{_decided(record, text)}" for record in usable for text in differences(record)),
     ]

@@ -114,10 +114,9 @@ def page(records: Sequence[Record], tally: dict[str, Any]) -> str:
     lines = [
         "# Attacks on verdicts and edges",
         "",
-        "Written by `python -m benchmarks.truth --report --table docs/evidence/truth.md`. [How certain was "
-        "tested](../hunting.md) says what an attack is. Right is what the attack did not refute; what is certain and "
-        "neither right nor wrong was given up for its work, or leaves nothing to try (no friction, or a reference that "
-        "never stands still). Code: digests of what checks rest on, and of the adversary.",
+        "Written by `python -m benchmarks.truth --report --table docs/evidence/truth.md`. [How friso finds "
+        "hunting](../hunting_method.md) says what an attack is. Right: not refuted; certain and neither right nor "
+        "wrong: the attack ran out of work, or had nothing to try. Code: digests of the check and of the adversary.",
         "",
         *markdown(head, rows),
         "",

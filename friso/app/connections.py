@@ -15,13 +15,15 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from friso.app.gate import LET_IN
 
 MOST = 64
-"""Connections at most. Browsers have six to a server, and systems allow a process 256 open files or more."""
+"""Largest number of connections.
+
+Browsers open six to a server, and systems allow a process 256 open files or more."""
 
 HEADERS = 10.0
-"""Time [s] within which a request has to be complete up to its body: a browser sends that at once."""
+"""Time limit [s] for a request up to its body, which a browser sends at once."""
 
 SENDING = 120.0
-"""Time [s] within which whoever has no key has to have read what is handed to anybody, 5 MB."""
+"""Time limit [s] for a client without a key to read the public files, 5 MB."""
 
 LOGGER = logging.getLogger("friso.app")
 
@@ -32,14 +34,14 @@ OUT_OF_FILES = (
 
 
 class Connection(H11Protocol):
-    """A connection that is cut off when it rests too long, or is held too long without a key.
+    """A connection that is closed when idle too long, or when held too long without a key.
 
-    If all places are taken, the connection that has rested longest makes way for a new one. A connection that answers
-    somebody with a key is never cut.
+    If all places are taken, the connection that has been idle longest is closed for a new one. A connection that
+    answers a client with a key is never closed.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place; abort the connection that has rested longest if all are taken."""
+        """Take a place; if all are taken, abort the connection that has been idle longest."""
         super().connection_made(transport)
         self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS, self._look)
         held = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
@@ -53,13 +55,13 @@ class Connection(H11Protocol):
         super().connection_lost(exc)
 
     def on_response_complete(self) -> None:
-        """Start to measure the rest before the next request."""
+        """Start the idle time before the next request."""
         self._since = self.loop.time()
         super().on_response_complete()
 
     @property
     def is_at_work(self) -> bool:
-        """Tell whether the connection answers somebody with a key."""
+        """Tell whether the connection is answering a client with a key."""
         return self._is_answering and LET_IN in self.scope
 
     @property
@@ -67,7 +69,7 @@ class Connection(H11Protocol):
         return self.cycle is not None and not self.cycle.response_complete
 
     def _look(self) -> None:
-        """Cut the connection off if its time is over; otherwise look again when it will be."""
+        """Close the connection if its time is over; otherwise check again when it will be."""
         allowed = SENDING if self._is_answering else HEADERS
         left = HEADERS if self.is_at_work else self._since + allowed - self.loop.time()
         if left <= 0:

@@ -44,7 +44,7 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
 
 
 class _Arrays:
-    """The arrays of a frame, one behind the other."""
+    """The arrays of a frame, in sequence."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []

@@ -43,24 +43,27 @@ TWICE = (
 )
 
 FRESH = 60.0
-"""Time [s] for which a token that is taken once can be taken: the browser that friso started is slower only by
-seconds."""
+"""Time [s] for which a one-time token is valid.
+
+The browser that friso started needs it within seconds."""
 
 LOGGER = logging.getLogger("friso")
 
 
 ENTRY = "/enter"
-"""Where a token is exchanged for a key."""
+"""Path at which a token is exchanged for a key."""
 
 TOKEN = "friso-token"
-"""The header that has a token."""
+"""Header that holds a token."""
 
 LET_IN = "friso.let_in"
-"""Marks the scope of a request that came with a key."""
+"""Marker in the scope of a request that came with a key."""
 
 BEARER = "Bearer "
-"""Text before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
-cookies, which also go to every other server of the same name, whatever its port."""
+"""Text before a key in the header `Authorization`.
+
+Browsers never add this header by themselves. Cookies, by contrast, are sent to every other server of the same name,
+whatever its port."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     once: dict[str, tuple[float, str]] = field(default_factory=dict)
-    """Tokens that are taken once, with the time [s] when each was made, and the session that it began, "" before."""
+    """One-time tokens, each with the time [s] at which it was made and the session that it began, "" before."""
     ended: set[str] = field(default_factory=set)
     """Sessions that are over."""
 
@@ -134,10 +137,10 @@ class Access:
 
 
 HTTP = 80
-"""The port that browsers leave out of names."""
+"""Port that browsers leave out of addresses."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-"""The names of this machine that no other machine can reach."""
+"""Names of this machine that no other machine can reach."""
 
 
 class Gate:

@@ -1,7 +1,4 @@
-"""Add to a figure what it is compared with.
-
-This is the pinned machine in grey, or the edge of hunting on a map.
-"""
+"""Add to a figure what it is compared with: the pinned machine in grey, or the edge of hunting on a map."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ if TYPE_CHECKING:
     from friso.interface.answer import Answer
 
 GHOST = "#a9a9a9"
-"""Colour of what is pinned."""
+"""Colour of lines of the pinned machine."""
 
 
 def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:

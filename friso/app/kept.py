@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from friso.interface.answer import Answer
 
 MOST = 4
-"""Answers that are kept of each function, those that were asked for last: a Bode plot takes 20 MB."""
+"""Number of latest answers kept of each function.
+
+An answer with a Bode plot takes 20 MB."""
 
 
 class KeptAnswers:

@@ -16,7 +16,7 @@ from friso.quantities import Number, Quantity
 from friso.stage import Stage, loads, numeric_keys
 
 REACH = 10.0
-"""How many times as large and as small a slider makes a value."""
+"""Ratio by which a slider can enlarge and reduce a value."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,9 @@ _VALUES = (str, bool, int, float, type(None))
 
 
 MOST_KEPT = 16
-"""Stages that are kept of the machines asked about last, whose texts may be of 4 MB each: while a slider moves, several
-questions are about the same one."""
+"""Number of latest stages kept in the cache.
+
+While a slider moves, several questions concern one machine. The text of a stage may take 4 MB."""
 
 
 @lru_cache(MOST_KEPT)

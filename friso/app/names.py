@@ -10,7 +10,9 @@ from friso.platform.system import name_refused
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 
 LONGEST = 150
-"""Bytes of a name at most; file systems take 255, and files beside this one get longer names."""
+"""Longest file name in bytes.
+
+File systems take 255, and names of accompanying files are longer."""
 
 
 def plain_name(name: str, otherwise: str) -> str:

@@ -41,7 +41,9 @@ if TYPE_CHECKING:
 AnswerPart = dict[str, Any]
 
 KEPT = KeptAnswers()
-"""Answers about machines; those of runs follow a slider, and are kept of the pinned machine alone."""
+"""Kept answers about machines.
+
+Answers about runs change with a slider, and are kept for the pinned machine only."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class PageRequest:
         return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """Return the options with these names that are set.
+        """Return those options in `names` that are set.
 
         Raises InputError for other names or values.
         """
@@ -240,10 +242,10 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "boundary": ("x", "y", "log"),
     "tune": ("within", "settle", "force_limit", "bandwidth_limit", "margin", "only", "keep"),
 }
-"""The options that a page may give a command."""
+"""The options that a page may set, by command."""
 
 COARSE_TO_FINE = (6, 21, 41)
-"""Points along each axis of a map, one picture after the other."""
+"""Numbers of points along each axis of a map, in the order of its pictures."""
 
 
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -454,13 +456,13 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "logs": logs,
     "identify": identify,
 }
-"""The questions by name."""
+"""The functions that answer questions, by name."""
 
 QUICK = frozenset({"machine"})
-"""The questions that compute nothing."""
+"""The questions that need no computation."""
 
 PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
-"""The questions whose first part is a picture that somebody waits for, and soon there: all others wait for it."""
+"""The questions whose first part is a picture that appears soon; all other questions wait for it."""
 
 
 def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:
@@ -497,7 +499,7 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
     "logs": _looked_into,
     "identify": _identified,
 }
-"""The commands whose files are handed out: all that the command writes, and its document, in one archive."""
+"""The commands whose files can be downloaded, as one archive with everything that the command writes."""
 
 
 def job_of(name: str) -> Callable[[PageRequest, Work], Iterator[AnswerPart]] | None:

@@ -26,17 +26,20 @@ from friso.platform.early import SIGNALS
 from friso.stage.files import load, text_of
 
 PORT = 8741
-"""The port unless another one is asked for: browsers keep what a page holds by its port."""
+"""Default port.
+
+Browsers store the contents of a page by its port."""
 
 GRACE = 2
-"""How long [s] the end of questions at work is waited for at most: overtaken, they end within 0.1 s, unless they are in
-the middle of a figure or a solution."""
+"""Longest wait [s] at the end for questions in progress.
+
+When stopped they end within 0.1 s, except in the middle of a figure or a solution."""
 
 LOGS = ("uvicorn.error", "asyncio", "friso.app")
-"""Whose messages anybody who reaches the server can bring about."""
+"""Loggers whose messages any client can cause."""
 
 TRIES = 20
-"""Ports that are tried beyond it, where it is taken."""
+"""Number of further ports that are tried if the default is taken."""
 
 
 def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:

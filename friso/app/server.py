@@ -24,7 +24,7 @@ from friso.app.work import Workshop
 from friso.errors import InputError
 
 MOST_BYTES = 8_000_000
-"""Size of a question at most: a stage file is of 4 MB at most, and another one may be pinned."""
+"""Largest size of a question in bytes: two stage files of 4 MB, one of them pinned."""
 
 KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
@@ -99,7 +99,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
 
 
 async def _gone(request: Request, error: Exception) -> Response:
-    """Answer a browser that left in the middle of its request, although nobody reads it."""
+    """Answer a request whose client has disconnected."""
     return Response(status_code=400)
 
 
@@ -132,7 +132,7 @@ def _plotly_js() -> bytes:
 
 
 CHUNK = 65536
-"""Bytes of a file that wait for a reader who is slow: the rest stays where it is."""
+"""Bytes of a file that are buffered for a slow reader."""
 
 
 def _file(request: Request, content: bytes, kind: str) -> Response:

@@ -13,14 +13,14 @@ from friso.platform.leftovers import temporary_folder
 from friso.platform.system import remove_folder
 
 MOST_BYTES = 64_000_000
-"""Size of a log at most."""
+"""Largest size of a log in bytes."""
 
 MOST_FILES = 50
-"""Files that are kept at most."""
+"""Largest number of files kept."""
 
 
 PREFIX = "friso-uploads-"
-"""How the folders of servers begin."""
+"""Prefix of the servers' folders."""
 
 
 class Uploads:

@@ -1,4 +1,4 @@
-"""Run each question in a thread until it is answered or overtaken.
+"""Run each question in a thread until it is answered or superseded.
 
 Progress and messages are sent to the page meanwhile.
 """
@@ -27,10 +27,12 @@ Job = Callable[["Work"], Iterator[dict[str, Any]]]
 """A function that answers a question and yields the parts of its answer."""
 
 OFTEN = 0.1
-"""Seconds between two reports of progress."""
+"""Time [s] between two reports of progress."""
 
 THREADS = 16
-"""Questions at work at the same time: many of them wait, for a kernel or for what computes before them."""
+"""Number of questions in progress at one time.
+
+Many wait for a kernel, or for earlier computations."""
 
 
 @dataclass(eq=False)
@@ -44,13 +46,13 @@ class Work:
     put: Callable[[dict[str, Any] | None], object]
     number: int = 0
     first: bool = False
-    """Whether all other work waits until the first part of its answer is there."""
+    """Whether all other questions wait for the first part of this answer."""
     flag: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     last: float = 0.0
     notes: list[str] = field(default_factory=list)
-    """Warnings so far, each once; they go with the answer."""
+    """Warnings so far, each once; they are sent with the answer."""
     meanwhile: list[str] = field(default_factory=list)
-    """Messages logged early; most answers repeat them."""
+    """Messages logged early, most of which the answer repeats."""
 
     def overtake(self) -> None:
         """Ask this question to stop; safe to call from another thread."""

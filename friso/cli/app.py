@@ -93,7 +93,9 @@ def command_line(*names: str, for_list: bool = False) -> typer.Typer:
 
 
 GARBAGE = 20_000, 20, 10
-"""How often unused objects are looked for: as often as is usual takes a tenth of the time of imports and figures."""
+"""Thresholds of Python's garbage collector.
+
+The defaults take a tenth of the time of imports and figures."""
 
 
 def main() -> NoReturn:

@@ -54,10 +54,10 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
 
 
 _BORDER = 3
-"""Width of what separates two columns of a table."""
+"""Width between two columns of a table, in characters."""
 
 _LEAST = 8
-"""Width that a column beside the names may always have."""
+"""Width, in characters, that a column beside the names may always have."""
 
 
 def _narrow(texts: Sequence[str]) -> int:

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 LINES = 10.0
-"""Seconds between lines of progress where no terminal shows a bar."""
+"""Time [s] between lines of progress where no terminal shows a bar."""
 
 SHARE, STEPS = 0.05, 100
-"""The share of work, or its steps where these are fewer, that tells how long the rest takes."""
+"""Part of the work that must be done before the remaining time is estimated.
+
+It is this fraction of all steps, or this number of steps if fewer."""
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
@@ -81,7 +83,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
 
     def line(self) -> str:
-        """Return the share done, what is being done, and the time left at the pace so far."""
+        """Return the fraction done, the current label, and the estimated time left."""
         with self._turn:
             share = f"{100 * self.done // self.total} %" if self.total else ""
             return ", ".join(part for part in (share, one_line(self.label) or "working", self._to_go()) if part)
@@ -120,14 +122,14 @@ def _display(to_go: Callable[[], str]) -> Display:
     from rich.text import Text
 
     class Rate(ProgressColumn):
-        """Steps per second, where they are many."""
+        """The column with the steps per second."""
 
         def render(self, task: Task) -> Text:
             """Write the steps per second, if there is one or more."""
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     class ToGo(ProgressColumn):
-        """The time that the rest of the work takes."""
+        """The column with the estimated time left."""
 
         def render(self, task: Task) -> Text:
             """Write the time left."""

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 
 class Piped:
-    """A stream that raises BrokenPipeError where nobody reads it any more, on every system."""
+    """A stream that raises BrokenPipeError when its reader has gone, on every system."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text."""
+        """Write a text to the stream."""
         with closed_pipes_told():
             return self.stream.write(text)
 
     def flush(self) -> None:
-        """Write what is held back."""
+        """Flush the stream."""
         with closed_pipes_told():
             self.stream.flush()
 
@@ -41,7 +41,7 @@ class Piped:
 
 
 class Escaping(Piped):
-    """One on which everything is escaped that is written."""
+    """A stream that escapes everything written to it."""
 
     def write(self, text: str) -> int:
         """Write a text, escaped."""
@@ -69,7 +69,7 @@ def console(stream: TextIO, **options: Any) -> Console:
 
 
 SPELLED = "friso.spelled"
-"""The error handler of streams: a character that the encoding lacks is spelled."""
+"""Name of the error handler of streams, which spells characters that the encoding lacks."""
 
 
 def spelled(text: str, encoding: str) -> str:

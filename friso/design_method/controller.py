@@ -1,7 +1,4 @@
-"""Choose the controller of a design: its crossover and its margins.
-
-It is also computed whether more damping in the joint would help.
-"""
+"""Choose the controller of a design: crossover, gains and margins, and whether more joint damping would help."""
 
 from __future__ import annotations
 
@@ -21,7 +18,7 @@ from friso.leaf_springs.evaluation import Evaluation
 from friso.stage import Stage
 
 RATIOS = np.geomspace(0.02, 0.7, 9)
-"""Joint damping that is tried, as a damping ratio of the stage on the joint."""
+"""Joint dampings that are tried, as damping ratios of the stage on the joint."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +33,9 @@ class Damping:
 
     @property
     def worth(self) -> int:
-        """Return the number of the least damping that brings nearly all of the possible gain.
+        """Return the index of the smallest damping that gives nearly all of the possible margin.
 
-        It is 0 if the stage's own damping already does.
+        Index 0 is the stage's own damping.
         """
         settings = DesignSettings.current()
         return int(np.flatnonzero(self.margins >= settings.enough_margin * self.margins.max())[0])

@@ -1,6 +1,6 @@
 """Find the edge of hunting over the corners of a specification.
 
-The edge is the highest crossover at which anything attracts. It is found to within 1 or 2 % in seconds, since a design
+The edge is the highest crossover at which a stage hunts. It is located to 1 or 2 % in seconds, because a design
 simulates all its moves afterwards.
 """
 
@@ -23,10 +23,10 @@ from friso.progress import Progress, silent
 class Corners:
     """The corners of a specification with the edge of hunting of each.
 
-    `edges` [Hz], shape (n,), is the highest crossover at which anything attracts. It is 0 if nothing attracts from
-    `searched[0]` on, and infinite if something still attracts at `searched[1]`. In `unknown` corners the edge is not
-    certain: simulations below it failed or had not settled, which counts as hunting. There may also be attractors above
-    it that no simulation starts from.
+    `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts. It is 0 if it does not hunt from
+    `searched[0]` on, and infinite if it still hunts at `searched[1]`. In `unknown` corners the edge is not certain:
+    simulations below it failed or had not settled, which counts as hunting. There may also be attractors above it that
+    no simulation starts from.
     """
 
     population: Population
@@ -41,7 +41,7 @@ class Corners:
 
     @property
     def highest(self) -> float:
-        """Return the highest crossover [Hz] at which anything attracts in any corner.
+        """Return the highest crossover [Hz] at which any corner hunts.
 
         It is never below the beginning of the search.
         """
@@ -49,7 +49,7 @@ class Corners:
 
     @property
     def hunts(self) -> bool:
-        """Tell whether anything attracts anywhere in the range searched."""
+        """Tell whether any corner hunts in the range searched."""
         return bool(np.any(self.edges > 0))
 
 
@@ -64,8 +64,8 @@ def edges_over(
 ) -> Corners:
     """Find the edges of the stage `flat` in all corners, tuned by van Dijk's rules.
 
-    The search goes down from `high` to `low` [Hz] on a grid of `steps`, until something attracts. Then it refines
-    between that point and the one above. `label` names the search to the progress.
+    The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts, then refines between
+    that point and the one above. `label` names the search to the progress.
     """
     settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
@@ -103,8 +103,8 @@ def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
 class OtherLaws:
     """The friction of stages converted to other laws, as flat keys by the name of the law.
 
-    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep what is
-    measured, each with the indices of the stages where they lose it.
+    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep the measured
+    friction, each with the indices of the stages concerned.
     """
 
     frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -118,10 +118,7 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tell whether anything attracts, or may attract, in corners at logarithms of crossovers.
-
-    The second array tells whether that is certain.
-    """
+    """Tell whether corners hunt, or may hunt, at logarithms of crossovers, and whether that is certain."""
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)

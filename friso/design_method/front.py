@@ -97,7 +97,7 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
 
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
-    """Return a geometry that meets the requirements with the most to spare; None if none does.
+    """Return a geometry that meets the requirements with the largest reserve; None if none does.
 
     It is found by differential evolution, and given as logarithms of its sizes with the number of its sheet, shape
     (4,).

@@ -18,7 +18,7 @@ SIZES = ("length", "width", "spacing")
 
 @dataclass(frozen=True)
 class Sheet:
-    """A purchase for leaf springs: number of leaves, thickness of the sheet [m], and material."""
+    """Material for leaf springs: number of leaves, thickness of the sheet [m], and material."""
 
     leaves: float
     thickness: float

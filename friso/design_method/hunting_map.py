@@ -16,10 +16,10 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class HuntingMap:
-    """The share of corners that are not in position, over crossover and stroke.
+    """The fraction of corners that are not in position, over crossover and stroke.
 
-    Crossovers [Hz] have shape (n,), strokes [m] (m,), and shares (m, n). A corner counts if the stage is not in
-    position a quarter of a minute after a typical move. The share is NaN where a run failed.
+    Crossovers [Hz] have shape (n,), strokes [m] (m,), and fractions (m, n). A corner counts if the stage is not in
+    position a quarter of a minute after a typical move. The fraction is NaN if a run failed.
     """
 
     crossovers: np.ndarray

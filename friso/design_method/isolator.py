@@ -14,10 +14,10 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 
 STROKE = 1e-3
-"""The joint that a search begins with: stroke [m], force at the stroke over static friction, damping ratio."""
+"""Joint from which a search starts: stroke [m], force at the stroke over static friction, damping ratio."""
 
 STEEL = 190e9
-"""Young's modulus of spring steel [Pa], of which leaves and stops are where nothing else is told."""
+"""Young's modulus of spring steel [Pa], the default for leaves and stops."""
 
 
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
@@ -31,7 +31,7 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
-    """Return the stage with a free joint: its own, or one to begin a search with.
+    """Return the stage with a free joint: its own, or one from which a search starts.
 
     The new joint has a stroke [m] and leaves with a Young's modulus `young` [Pa]. The controller stays tuned for the
     whole mass. Raises StageError if the result is not a valid stage.

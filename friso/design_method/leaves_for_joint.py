@@ -29,14 +29,14 @@ from friso.quantities import exactly
 from friso.stage import Stage
 
 OF_LEAVES = (*SIZES, "leaves", "thickness", "material", "young", "poisson", "density", "yield", "fatigue")
-"""Keys of [flexure] that are of the leaves; the others are of what they guide."""
+"""Keys of [flexure] that describe the leaves; the others describe the stage that they guide."""
 
 
 def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     """Return the stage with leaf springs in place of its joint's numbers and its parasitic mode.
 
-    The leaf springs have the same stiffness and interfere at the highest possible frequency. Sizes, sheets, loads and
-    factors of safety are those that `friso init --spec` begins with. Returns None if no leaves bear stroke and load.
+    The leaf springs have the joint's stiffness and the highest possible interfering frequency. Sizes, sheets, loads and
+    factors of safety are the defaults of `friso init --spec`. Returns None if no leaves bear stroke and load.
 
     If the stage `present` has [flexure], its points keep their distance from the leaf ends. Raises InputError for a
     joint that leaf springs cannot make.
@@ -70,10 +70,7 @@ def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
 
 
 class _Search:
-    """The search over length, spacing and sheet of the leaves.
-
-    The width follows from the stiffness wanted.
-    """
+    """The search over length, spacing and sheet of the leaves, whose width follows from the stiffness."""
 
     def __init__(self, task: LeafTask, stiffness: float) -> None:
         """Prepare the search for leaves of a `stiffness` [N/m].
@@ -105,10 +102,10 @@ class _Search:
         return np.asarray(minimum.x)
 
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Return what is minimised over lengths and spacings [m], (count, 2).
+        """Return the cost over lengths and spacings [m], (count, 2), to be minimised.
 
-        It is how far leaves break a requirement. For leaves that break none, it falls as their interfering frequency
-        rises.
+        It is the amount by which leaves break a requirement. For leaves that break none, it falls as their interfering
+        frequency rises.
         """
         settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
@@ -117,7 +114,7 @@ class _Search:
         return np.where(worst > 0, settings.worst_cost + worst, -np.log(frequency))
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Return lengths, widths and spacings [m], (count, 3), of leaves with the stiffness wanted."""
+        """Return lengths, widths and spacings [m], (count, 3), of leaves with the required stiffness."""
         settings = DesignSettings.current()
         sizes = np.insert(spans, 1, self.high[1], axis=1)
         for _ in range(settings.width_steps):
@@ -137,10 +134,9 @@ class _Search:
         return np.where(np.isfinite(worst), worst, settings.worst_cost)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
-        """Return the geometries in sizes that can be made, next to one of shape (3,).
+        """Return the geometries in whole sizes next to one of shape (3,), with the required stiffness.
 
-        They have the stiffness wanted and break no requirement. Those that interfere at the highest frequency come
-        first.
+        They break no requirement, and the highest interfering frequency comes first.
         """
         settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]

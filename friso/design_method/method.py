@@ -40,7 +40,7 @@ from friso.quantities import percent
 from friso.stage import Stage
 
 Frictions = Callable[[Sequence[Stage]], OtherLaws]
-"""The friction of stages that differ in its numbers, under other laws."""
+"""Function that returns the friction of stages, which differ in its numbers, under other laws."""
 
 
 def own_law(stages: Sequence[Stage]) -> OtherLaws:
@@ -50,9 +50,9 @@ def own_law(stages: Sequence[Stage]) -> OtherLaws:
 
 @dataclass(frozen=True)
 class Need:
-    """The result that decides whether a machine needs an isolator.
+    """Result that decides whether a machine needs an isolator.
 
-    `without` holds the edges of hunting without an isolator over the corners of the specification.
+    `without` are the edges of hunting without an isolator over the corners of the specification.
     """
 
     without: Corners
@@ -162,7 +162,7 @@ class Design:
 
 @dataclass(frozen=True)
 class UnfinishedDesign:
-    """What an interruption left of a design: leaf springs, stroke and crossover, not tried in moves.
+    """Design left by an interruption: leaf springs, stroke and crossover, not tried in moves.
 
     `need` tells whether an isolator is needed; `edges` of hunting with it are None if they were not found yet.
     """
@@ -180,7 +180,7 @@ class UnfinishedDesign:
 
     @property
     def meets(self) -> bool:
-        """Tell whether the specification is met, which nobody knows yet."""
+        """Return False, because it is not known whether the specification is met."""
         return False
 
 
@@ -251,7 +251,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
 
 
 def _friction_of(population: Population, number: int) -> dict[str, float]:
-    """Return the friction keys of one of the machines that differ from the stage's."""
+    """Return the friction keys of one machine that differ from the stage's."""
     return {key: value for key, value in population.of(number).items() if key.startswith("friction.")}
 
 
@@ -279,7 +279,7 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """Return the least joint damping that no longer limits the crossover.
 
     The crossover [Hz] that leaves and machine then allow is returned with it. Returns nothing if the crossover is that
-    high already, or if no damping tried helps.
+    high already, or if no tried damping helps.
     """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
@@ -355,7 +355,7 @@ def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], populat
 
 
 def _down(crossover: float) -> float:
-    """Round a crossover down to three digits."""
+    """Round a crossover [Hz] down to three digits."""
     step = 10 ** (np.floor(np.log10(crossover)) - 2)
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
@@ -363,7 +363,7 @@ def _down(crossover: float) -> float:
 def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
     """Check the distance of the crossover from the edge of hunting.
 
-    Raises NoDesign if it is too close.
+    Raises NoDesign if it is too small.
     """
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
@@ -380,7 +380,7 @@ def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
 
 
 def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
-    """Return what would let the crossover keep its distance from the edge [Hz]."""
+    """Return relaxations with which the crossover keeps its distance from the edge [Hz]."""
     spec, name = fit.task.spec, "crossover above the edge of hunting"
     above = [max(low, needed) for low, high in fit.comfortable if high > needed]
     allowed_ = fit.choice.frequency / spec.safety.parasitic

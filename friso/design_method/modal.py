@@ -21,7 +21,7 @@ from friso.frequency.settings import FrequencySettings
 from friso.leaf_springs.evaluation import Evaluation
 
 AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
-"""Where the loop is looked at about a mode, in units of its half width."""
+"""Frequencies at which the loop is evaluated about a mode, in units of its half width."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +76,12 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Count how often curves, (..., frequencies), run around the origin.
-
-    They run from the first frequency to the last.
-    """
+    """Count how often curves, (..., frequencies), run around the origin from the first frequency to the last."""
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """Return what all modes but the drive mode add to the plant [m/N].
+    """Return the part of all modes but the drive mode in the plant [m/N].
 
     `omega` are frequencies [rad/s]; the result has shape (frequencies,).
     """

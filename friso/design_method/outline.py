@@ -93,7 +93,7 @@ def _aligned(lines: Sequence[str]) -> str:
 
 
 def _line(stage: Stage, key: str, share: float) -> str:
-    """Return the range of a key: its own, or a share around its value.
+    """Return the range of a key: its own, or a fraction around its value.
 
     Coulomb friction does not exceed the static friction.
     """

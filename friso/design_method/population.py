@@ -96,7 +96,7 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
-    """Return moves there and back at shares of the ranges of travel and acceleration."""
+    """Return moves there and back at fractions, from 0 to 1, of the ranges of travel and acceleration."""
     settings = DesignSettings.current()
     distance, rate = (
         interval.low * (interval.high / interval.low) ** share
@@ -135,9 +135,9 @@ def _masses(spec: Spec) -> dict[str, Interval]:
 def _population(
     ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
 ) -> Population:
-    """Return machines at shares of the ranges.
+    """Return machines at fractions, from 0 to 1, of the ranges.
 
-    Sliding friction is held at or below the static friction. Machines where both are equal cannot hunt, but exist.
+    Sliding friction is limited to the static friction. Machines with both equal cannot hunt, but exist.
     """
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}

@@ -16,7 +16,7 @@ from friso.stage import Stage
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
 
 LIMITS = ("force_limit", "anti_windup", "anti_windup_time")
-"""Keys of a controller that one by other rules keeps."""
+"""Keys of a controller that are kept when its rules are replaced."""
 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
@@ -57,9 +57,10 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
 
 def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
-    """Return the key by which actuator and sensor are off the middle of the leaves' width; none if the stage has any.
+    """Return the key of the offset of actuator and sensor from mid-width; empty if the stage states one.
 
-    Without an offset, a mode in which the stage turns about the leaves would be seen by neither, as on no machine.
+    Without an offset, neither would see a mode in which the stage turns about the leaves, which no real machine
+    achieves.
     """
     points = {f"flexure.{point}_{axis}" for point in ("actuation", "sensor") for axis in "xyz"}
     if points & stage.flat().keys() or not spec.leaves.offset:
@@ -70,8 +71,8 @@ def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
 def by_rules(stage: Stage) -> Stage:
     """Return the stage with a controller by van Dijk's rules.
 
-    Its own is kept if it follows these rules. Otherwise the new one has the same bandwidth for the whole mass, and the
-    same force limit.
+    A controller that follows these rules is kept. Otherwise the new one has equal bandwidth for the whole mass, and
+    equal force limit.
     """
     if CROSSOVER in stage.flat():
         return stage

@@ -168,10 +168,10 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
 
 
 def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
-    """Return the load on the leaves as a share of what makes them give way.
+    """Return the load on the leaves relative to the load at which they buckle.
 
-    It adds two shares: the largest force along a leaf, as if it pressed on all, over the `buckling` load [N]; and the
-    force across the leaves over that at which they give way sideways.
+    It adds two parts: the largest force along a leaf, as if it pressed on all, over the `buckling` load [N]; and the
+    force across the leaves over that at which they buckle sideways.
     """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
@@ -197,10 +197,10 @@ def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
 
 
 def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
-    """Return the stress at the clamps that the loads make [Pa].
+    """Return the stress at the clamps by the loads [Pa].
 
-    A force across the leaf ends bends leaves in their plane as cantilevers, since nothing else holds the stage about z.
-    A moment about x bends them as leaves whose ends stay parallel.
+    A force across the leaf ends bends leaves in their plane as cantilevers, because nothing else holds the stage about
+    z. A moment about x bends them as leaves whose ends stay parallel.
     """
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
     about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2

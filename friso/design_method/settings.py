@@ -1,4 +1,4 @@
-"""Tuning numbers of `friso.design_method`, with the reason for each."""
+"""Settings of `friso.design_method`, with a reason for each."""
 
 from __future__ import annotations
 
@@ -12,160 +12,163 @@ class DesignSettings(Settings):
     """Settings of the design of leaf springs, joint and controller."""
 
     size_step: float = setting(1e-4, "m")
-    """Sizes that a workshop makes without asking."""
+    """Step of sizes that a workshop makes."""
 
     confirmed_candidates: int = setting(24, "")
-    """Each takes a second of the beam model; the front has no more that differ visibly."""
+    """Candidates of the front confirmed by the beam model, which takes a second for each."""
 
     enough_margin: float = setting(0.95, "")
-    """More damping than gives this share of the best modulus margin is not worth its trouble."""
+    """Fraction of the best modulus margin beyond which more damping is not worth its trouble."""
 
     edge_bisections: int = setting(3, "")
-    """Locates an edge to 1 or 2 %; each takes a search for orbits."""
+    """Bisections that locate an edge to 1 or 2 %. Each takes a search for orbits."""
 
     orbit_rtol: float = setting(1e-7, "")
-    """Multipliers are needed to a percent; looser orbits give them to ten."""
+    """Tolerance of orbits. Multipliers are needed to a percent."""
 
     front_population: int = setting(160, "")
-    """Smaller populations leave gaps in the front."""
+    """Population of the search for the front. A smaller one leaves gaps."""
 
     front_generations: int = setting(120, "")
-    """Fewer have not converged for specifications with many requirements."""
+    """Generations of the search for the front. Fewer have not converged with many requirements."""
 
     start_generations: int = setting(60, "")
-    """A geometry that meets all requirements is found by then, or there is none."""
+    """Generations in which a geometry that meets all requirements is found, if there is one."""
 
     front_seed: int = setting(34, "")
-    """Any number does; a fixed one gives equal fronts for equal specifications."""
+    """Seed of the front. A fixed one gives equal fronts for equal specifications."""
 
     map_crossovers: int = setting(24, "")
-    """Fewer show steps in the edge; each is a search of a cell."""
+    """Crossovers of the map. Fewer show steps in the edge; each is a search of a cell."""
 
     map_strokes: int = setting(16, "")
-    """Fewer show steps in the edge; each is a search of a cell."""
+    """Strokes of the map. Fewer show steps in the edge; each is a search of a cell."""
 
     map_reach: tuple[tuple[float, ...], ...] = setting(((1 / 30, 2.0), (1 / 30, 3.0)), "")
-    """In units of the design: shows both edges of hunting of the thesis's rig."""
+    """Range of the map in units of the design, which shows both edges of hunting of the thesis's rig."""
 
     stage_mass_share: float = setting(0.3, "")
-    """The thesis's rig has 0.29; used where the stage file does not tell."""
+    """Fraction of the mass on the joint if the stage file has one mass. The thesis's rig has 0.29."""
 
     first_force_share: float = setting(0.5, "")
-    """A search begins in the middle of what works: at 1 the cart moves before the joint."""
+    """Force at the stroke over static friction from which a search starts. At 1 the cart moves before the joint."""
 
     first_damping: float = setting(0.05, "")
-    """A search begins with the damping that leaf springs have with a little grease."""
+    """Damping ratio from which a search starts, that of leaf springs with a little grease."""
 
     stop_stiffness: float = setting(0.1, "")
-    """Over Young's modulus times the stroke; of the thesis's limiter it is 0.105."""
+    """Stiffness of the stop over Young's modulus times the stroke. The thesis's limiter has 0.105."""
 
     stop_damping: float = setting(0.016, "")
-    """Damping ratio of the stop; the thesis's limiter has it with its stage."""
+    """Damping ratio of the stop, that of the thesis's limiter with its stage."""
 
     leaves_seed: int = setting(36, "")
-    """Any number does; a fixed one gives equal leaves for equal joints."""
+    """Seed of the search for leaves. A fixed one gives equal leaves for equal joints."""
 
     leaves_generations: int = setting(60, "")
-    """Fewer have not converged; the search takes a second."""
+    """Generations of the search for leaves. Fewer have not converged."""
 
     leaves_points: int = setting(20, "")
-    """For each of three variables; fewer are caught in the first thickness."""
+    """Points for each of three variables. Fewer stay at the first thickness."""
 
     highest_mode: float = setting(1e6, "Hz")
-    """Stands for leaves none of whose modes actuator and sensor both see."""
+    """Frequency of leaves without a mode that both actuator and sensor see."""
 
     worst_cost: float = setting(1e3, "")
-    """Above the cost of any leaves that meet the requirements."""
+    """Cost above that of any leaves that meet the requirements."""
 
     width_steps: int = setting(5, "")
-    """The stiffness rises nearly as the width: five steps reach a percent under any load."""
+    """Steps that adapt the width to the stiffness, to a percent under any load."""
 
     stiffness_error: float = setting(0.01, "")
-    """Whole sizes come no closer."""
+    """Relative error of the stiffness allowed for whole sizes."""
 
     tried_strokes: int = setting(4, "")
-    """Where the specification leaves a range; each takes a design."""
+    """Strokes tried over a range in the specification. Each takes a design."""
 
     lowest_edge: float = setting(1 / 40, "")
-    """In units of the machine's limit: slower loops hunt whatever the joint."""
+    """Lowest crossover of the search, over the machine's limit. Slower loops hunt with any joint."""
 
     highest_edge: float = setting(3.0, "")
-    """In units of the machine's limit: faster loops are unstable."""
+    """Highest crossover of the search, over the machine's limit. Faster loops are unstable."""
 
     edge_steps: int = setting(24, "")
-    """Fewer step over a narrow range of hunting; each is a search of a cell."""
+    """Crossovers of the search for an edge. Fewer step over a narrow range of hunting."""
 
     above_crossover: float = setting(2.0, "")
-    """In units of the crossover chosen: an edge beyond it does not matter."""
+    """Factor on the chosen crossover beyond which an edge does not matter."""
 
     slow_share: float = setting(0.05, "")
-    """Share of the moves that may take longer than specified; less would need ten times the moves."""
+    """Fraction of the moves that may take longer than specified. Less would need ten times the moves."""
 
     design_rounds: int = setting(12, "")
-    """Leaves and crossover that do not agree by then go round in circles."""
+    """Rounds of leaves and crossover after which they do not agree."""
 
     lower_crossover: float = setting(0.97, "")
-    """Smaller steps need more rounds, larger ones give crossover away."""
+    """Factor by which the crossover is lowered in a round. Smaller steps need more rounds; larger ones waste crossover.
+    """
 
     accepted_crossover: float = setting(0.98, "")
-    """Softer leaves for the last two percent of crossover are not worth it."""
+    """Fraction of the possible crossover that is accepted rather than softer leaves."""
 
     friction_spread: float = setting(0.3, "")
-    """What catalogues give for bearings of one type."""
+    """Relative spread of friction, as in catalogues of bearings of one type."""
 
     mass_spread: float = setting(0.05, "")
-    """What payloads usually differ by."""
+    """Relative spread of masses, that of usual payloads."""
 
     shortest_move: float = setting(0.1, "")
-    """Shorter moves are no longer moves of this stage."""
+    """Shortest move over the longest."""
 
     corner_levels: tuple[float, ...] = setting((0.0, 0.5, 1.0), "")
-    """Hunting is not monotonous in static friction and gap: the middle counts too."""
+    """Places in the ranges of static friction and gap. The middle counts too, because hunting is not monotonous in
+    both."""
 
     population_seed: int = setting(6, "")
-    """Any number does; a fixed one draws equal machines for equal specifications."""
+    """Seed of the machines. A fixed one draws equal machines for equal specifications."""
 
     return_after: float = setting(5.0, "s")
-    """As in the thesis's path: a stage that hunts has shown it by then."""
+    """Time of the return, as in the thesis's path."""
 
     relaxed_beyond: float = setting(3.0, "")
-    """Space and sheets further beyond the specification are another design."""
+    """Factor by which space and sheets may exceed the specification in a proposal."""
 
     relaxed_population: int = setting(16, "")
-    """Smaller populations miss the requirement that stands alone in the way."""
+    """Population of the search for relaxations. A smaller one misses a requirement that alone stands in the way."""
 
     relaxed_generations: int = setting(80, "")
-    """Fewer have not converged; the search takes a second."""
+    """Generations of the search for relaxations. Fewer have not converged."""
 
     relaxed_seed: int = setting(5, "")
-    """Any number does; a fixed one gives equal proposals for equal specifications."""
+    """Seed of the search for relaxations. A fixed one gives equal proposals for equal specifications."""
 
     unmet_penalty: float = setting(10.0, "")
-    """The logarithm of a factor beyond all relaxation."""
+    """Penalty of unmet requirements, the logarithm of a factor beyond all relaxation."""
 
     relaxed_reserve: float = setting(0.01, "")
-    """Sizes are made in whole steps: without a reserve the others are missed."""
+    """Reserve of other requirements in a relaxation, because sizes are made in whole steps."""
 
     relaxed_more: float = setting(1.03, "")
-    """More is asked of what is relaxed, for the same reason."""
+    """Factor on a relaxed requirement, because sizes are made in whole steps."""
 
     model_reserve: float = setting(1.015, "")
-    """Closed forms may be off by so much (docs/evidence/flexure.md): the beam model confirms what keeps it."""
+    """Reserve for the error of closed forms (docs/evidence/flexure.md), so that the beam model confirms the result."""
 
     verified_moves: int = setting(10_000, "")
-    """Shows a share of 95 % to half a percent."""
+    """Verified moves, which show 95 % to half a percent."""
 
     followed_time: float = setting(15.0, "s")
-    """As in the thesis's path: a stage that hunts has shown it by then."""
+    """Time for which a move is followed, as in the thesis's path."""
 
     longer_factor: float = setting(10.0, "")
-    """Machines not in position by then are followed so much longer: they creep or hunt."""
+    """Factor on that time for machines not in position by then: they creep or hunt."""
 
     last_share: float = setting(0.25, "")
-    """Longer than the period of the slowest hunting that was seen."""
+    """Final part of the run in which a stage must stay in its window, longer than the slowest period of hunting seen.
+    """
 
     verified_rtol: float = setting(1e-5, "")
-    """Tells whether a machine settles and when, to a few percent; tighter runs take longer."""
+    """Tolerance of the moves, which gives settling times to a few percent."""
 
     runs_per_report: int = setting(512, "")
-    """Progress is told every second or so."""
+    """Runs between progress reports, about a second."""

@@ -115,7 +115,7 @@ class SpecMachine(Section):
     @model_validator(mode="before")
     @classmethod
     def _by_its_former_name(cls, table: Any) -> Any:
-        """Accept `bandwidth_limit`, the name of the crossover limit in earlier specifications."""
+        """Accept `bandwidth_limit`, the former name of the crossover limit, in specifications."""
         if isinstance(table, dict) and FORMER_LIMIT in table and "crossover_limit" not in table:
             others = {key: value for key, value in table.items() if key != FORMER_LIMIT}
             return {**others, "crossover_limit": table[FORMER_LIMIT]}

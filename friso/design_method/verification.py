@@ -31,7 +31,7 @@ THERE_AND_BACK = {
     "return_at": "5 s",
     "duration": "20 s",
 }
-"""A motion whose numbers are replaced by those of a machine."""
+"""A motion whose numbers are replaced by those of each machine."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class MachineOutcomes:
         return share_interval(self.missed, self.tried)
 
     def slower_than(self, share: float) -> float:
-        """Return the settling time [s] that a share of the moves exceeds.
+        """Return the settling time [s] that a given fraction of the moves exceeds.
 
         It is infinite if more moves than that do not settle.
         """
@@ -118,7 +118,7 @@ class Verification:
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
     """Try the design in machines and moves drawn from the specification.
 
-    The load takes up to the share `softening` of the drive stiffness.
+    The load reduces the drive stiffness by up to the fraction `softening`.
     """
     settings = DesignSettings.current()
     flat = stage.flat()

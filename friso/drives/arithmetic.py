@@ -1,4 +1,4 @@
-"""Read numbers as drive scripts write them: as digits, or as arithmetic of numbers."""
+"""Read numbers in drive scripts, written as digits or as arithmetic."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from math import inf, pi
 from operator import add, mul, neg, pos, sub, truediv
 
 LONGEST = 200
-"""Characters of arithmetic at most."""
+"""Longest arithmetic expression in characters."""
 
 _NAMED: Mapping[str, float] = {
     "float('inf')": inf,
@@ -19,7 +19,8 @@ _PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 _SIGNS = {ast.USub: neg, ast.UAdd: pos}
 
 _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
-"""Texts that are no arithmetic and would make Python's parser warn, such as letters behind a digit in 0x10."""
+"""Pattern of texts that are not arithmetic and would make Python's parser warn, such as letters after a digit in 0x10.
+"""
 
 
 def number_in(text: str) -> float | None:

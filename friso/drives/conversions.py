@@ -18,7 +18,9 @@ from friso.quantities import Quantity, positive
 from friso.stage.controllers import controller_of
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
-"""Answers of the user: travel of a turn, and torque of an ampere [N m/A], or force [N/A] without a turn."""
+"""Keys of the user's answers: travel per turn, and motor constant.
+
+The motor constant is torque per ampere [N m/A], or force per ampere [N/A] without a turn."""
 
 TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), KINDS["rotary"]: Quantity("rad", positive, "360 deg")}
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
@@ -95,7 +97,7 @@ class Turn:
 
 
 Convert = Callable[[float, Turn, AxisKind], list[Other]]
-"""From a value in SI to what it is in other units."""
+"""Function that converts a value in SI to other units."""
 
 
 def conversions(
@@ -194,4 +196,4 @@ BY_UNIT: Mapping[str, Convert] = {
     "1/s": _rate,
     "Hz": _frequency,
 }
-"""Converters of values in SI to other units, by their unit on a linear axis."""
+"""Converters of SI values to other units, by their unit on a linear axis."""

@@ -10,10 +10,10 @@ from friso.stage.filters import FEEDBACK, FORWARD
 from friso.stage.lists import row_keys
 
 ABOVE, MAIN, BELOW, LAST, LOWEST = range(5)
-"""Lines of a drawing."""
+"""Lines of a drawing, from top to bottom."""
 
 ASIDE = 6
-"""By how many characters what is added from below stands before its sum."""
+"""Characters between a signal from below and its summing point."""
 
 
 class Canvas:

@@ -20,8 +20,9 @@ FlatStage = Mapping[str, Any]
 """A stage as flat keys."""
 
 Beside = Callable[[str], str | None]
-"""The text of another file, by its name relative to the folder of a parameter file; None for one that is not in that
-folder or below it."""
+"""Function that returns the text of another file.
+
+The file's name is relative to the folder of a parameter file. The result is None for a file outside that folder."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +83,16 @@ class AxisParameters:
 
 
 _NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE)
-"""A number as drives read it: neither the underscores nor the digits of other scripts that Python takes. There is one
-way to read a run of digits: a hundred thousand take no time."""
+"""Pattern of a number as drives read it.
+
+Unlike Python, drives accept neither underscores nor digits of other scripts. The pattern matches a run of digits in
+only one way, so that a hundred thousand take no time."""
 
 MOST = 1e30
-"""Largest number that a parameter can be."""
+"""Largest value of a parameter."""
 
 ENDLESS = ("", "inf", "+inf", "infinity")
-"""How files write that there is no limit, or leave a parameter empty."""
+"""Values that stand for no limit, or for an empty parameter."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,9 @@ class ParameterFormat:
 
 
 TOLD = ("machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn")
-"""Names in [drive] of what friso init --from was told, or read, of a drive's units, and friso export asks for."""
+"""Keys of [drive] that hold the units of a drive, as told to friso init --from or read from a file.
+
+friso export needs them."""
 
 FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 

@@ -1,1 +1,1 @@
-"""From equations to numbers: generated kernels, cached on disk, run in lanes and threads."""
+"""Turn equations into numbers: generated kernels, cached on disk, run in lanes and threads."""

@@ -17,15 +17,15 @@ PER_BATCH = 1e5
 """Work to prepare a batch of runs."""
 
 COUNTED_LANES = 8
-"""Runs that are counted as done side by side on every processor: one with fewer lanes takes longer, and gives up where
-others do."""
+"""Runs that count as done side by side on every processor. One with fewer lanes takes longer, but stops where others
+do."""
 
 FAIR = 2.0
-"""Share of what is left that each of several runs may take, in units of an equal share."""
+"""Largest part of the remaining work for each of several runs, in units of an equal part."""
 
 
 class Exhausted(Exception):
-    """The work allowed does not suffice for the runs that were to be done."""
+    """Error: the allowed work does not suffice for the requested runs."""
 
 
 @dataclass
@@ -33,8 +33,7 @@ class Allowance:
     """Work that runs may take together, and how much of it is `used`.
 
     `work` counts steps times the work of a step of their kernel (`Kernel.work`; a unit is about 12 ns on a core of
-    2024). `exhausted` tells whether runs were given up for want of work, of this allowance or of one `around` it,
-    which limits it as well.
+    2024). `exhausted` tells whether runs were dropped because this allowance, or one `around` it, did not suffice.
     """
 
     work: float
@@ -49,7 +48,7 @@ class Allowance:
         return own if self.around is None else min(own, self.around.left)
 
     def most_steps(self, runs: int, step: float) -> float:
-        """Return how many steps each of some runs may take, a step being so much work.
+        """Return how many steps of the work `step` each of some runs may take.
 
         Raises Exhausted if nothing is left.
         """
@@ -59,7 +58,7 @@ class Allowance:
         return left / step * min(1 / COUNTED_LANES, FAIR / runs)
 
     def exhaust(self) -> NoReturn:
-        """Tell that the allowance, or one around it, does not suffice: raises Exhausted."""
+        """Raise Exhausted, because the allowance, or one around it, does not suffice."""
         left, at = self.left, self
         at.exhausted = True
         while at.work - at.used > left and at.around is not None:
@@ -68,9 +67,9 @@ class Allowance:
         raise Exhausted
 
     def charge(self, steps: np.ndarray, step: float) -> None:
-        """Count the work of a batch of runs by their steps, shape (runs,).
+        """Add the work of a batch of runs, from their steps, shape (runs,), and the work of a `step`.
 
-        `step` is the work of a step. A run alone takes as long as eight.
+        A run alone counts as much as eight.
         """
         work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self
@@ -83,7 +82,7 @@ _CURRENT: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
 
 
 def current_allowance() -> Allowance | None:
-    """Return the allowance under which runs are done now, if any."""
+    """Return the allowance of the current runs, or None."""
     return _CURRENT.get()
 
 

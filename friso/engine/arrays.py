@@ -12,7 +12,7 @@ class Tables(NamedTuple):
     """Tables that a drive with a clock looks up, evenly spaced.
 
     Tables over position have the shape (runs or 1, tables, points), with their first place and points per metre (runs
-    or 1, 2). Tables over time have the shape (runs or 1, tables, points), with their points per second (1,).
+    or 1, 2). Tables over time have that shape too, with their points per second (1,).
     """
 
     places: np.ndarray
@@ -51,11 +51,10 @@ class Batch(NamedTuple):
 
 
 class BatchOptions(NamedTuple):
-    """Options shared by all runs.
+    """Options of all runs in a batch.
 
-    They are the relative tolerance, the step budget, and the two bands of settling [m]. Then come the time [s] from
-    which turning points are kept, and the sampling interval [s]. A flag, shape (1,), when set, keeps further runs from
-    starting.
+    They are the relative tolerance, the step budget, the two bands of settling [m], the time [s] from which turning
+    points are kept, the sampling interval [s], and a flag, shape (1,), which when set keeps further runs from starting.
     """
 
     rtol: float
@@ -70,8 +69,8 @@ class BatchOptions(NamedTuple):
 class Results(NamedTuple):
     """Outputs of the runs.
 
-    Statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,). Then sampled
-    states with the numbers held (n, samples, states + held), and both at the end of the run.
+    They are statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,), sampled
+    states with the held numbers (n, samples, states + held), and both at the end of the run.
     """
 
     statistics: np.ndarray
@@ -84,10 +83,7 @@ class Results(NamedTuple):
 
 
 def new_queue() -> np.ndarray:
-    """Return a queue from which threads take the numbers of their runs one by one, shape (1,).
-
-    All threads stay busy to the end. The next run is 0.
-    """
+    """Return a queue, shape (1,), from which threads take the numbers of their runs, beginning with 0."""
     return np.zeros(1, np.int64)
 
 
@@ -103,14 +99,14 @@ STATISTICS = (
     "inner_before",
     "outer_before",
 )
-"""Largest force [N], extremes of the deviation in the window [m], when it last was outside the two bands [s], steps
-attempted and rejected, the time reached [s], and how long it took at most to enter the two bands at the places that the
-reference left again [s] (infinite: it had not when the reference left; 0: there is none). Extremes and moments are NaN
-where a drive has a clock: its samples tell them."""
+"""Names of the statistics of a run: largest force [N], extremes of the deviation in the window [m], last time outside
+each of the two bands [s], steps attempted and rejected, time reached [s], and longest time [s] to enter the two
+bands at places that the reference left again (infinite: not before the reference left; 0: no such place). Extremes
+and times are NaN for a drive with a clock, whose samples give them."""
 
 
 class Status(IntEnum):
-    """Outcomes of a run for the solver."""
+    """Outcomes of a run of the solver."""
 
     NOT_RUN = 0
     DONE = 1

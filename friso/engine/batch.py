@@ -1,4 +1,4 @@
-"""Many runs of one structure: prepared in NumPy, run in lanes and threads, handed over chunk by chunk."""
+"""Run many stages of one structure: prepare in NumPy, run in lanes and threads, return results chunk by chunk."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from friso.equations.reference import moved_on
 from friso.equations.roles import Steady
 
 LONGEST_SHARE = 1 / 200
-"""Longest step as share of the run: what the step does not look at, it may not pass over."""
+"""Longest step over the duration of the run. A longer one could pass over an event."""
 
 FIRST_STEP = 1e-3
-"""First step, and first after a corner of the reference, in units of 1/(natural frequency of mass and loop)."""
+"""First step, also after a corner of the reference, in units of 1/(natural frequency of mass and loop)."""
 
 CAPACITY = 512
-"""Turning points a run has room for at first; runs with more are run again with more room."""
+"""Turning points stored for a run at first; runs with more are repeated with more room."""
 
 MOST_TURNS = 1 << 20
-"""Turning points no run may exceed."""
+"""Most turning points of a run."""
 
 
 MORE = 2
-"""Factor on the step budget of a run that is repeated because its budget was used up."""
+"""Factor on the step budget of a run that is repeated because it used up its budget."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class RunOptions:
     """Options of runs.
 
     - Relative tolerance, step budget, and number of threads.
-    - Bands of settling [m]; start of the window for extremes, as a share of the run.
+    - Bands of settling [m]; start of the window for extremes, as a fraction of the run.
     - Time [s] from which turning points are kept, at most half of the run.
     - Smallest swing [m] between two of them, one number or one per run: smaller legs of a zigzag are skipped.
     - Room for turning points at first.
@@ -64,22 +64,22 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Runs:
-    """Results of some of the runs, whose numbers are given."""
+    """Results of some runs, with their numbers."""
 
     numbers: np.ndarray
     results: Results
 
     def statistic(self, name: str) -> np.ndarray:
-        """One column of `STATISTICS`, shape (runs,)."""
+        """Return one column of `STATISTICS`, shape (runs,)."""
         return self.results.statistics[:, STATISTICS.index(name)]
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys of the stages that these runs belong to."""
+        """Return the flat keys of the stages of these runs."""
         return part_of(flat, self.numbers)
 
 
 def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
-    """Return the flat keys of the stages with these numbers alone."""
+    """Return the flat keys of the stages with these numbers."""
     return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
@@ -127,9 +127,9 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return initial states: everything at rest, masses displaced as the motion says.
+    """Return initial states at rest, with masses displaced as the motion says.
 
-    What has been measured of the masses is displaced too.
+    Measurements of the masses are displaced too.
     """
     displacement = motion.initial_displacement(flat)
     return kernel.settled({**flat, "motion.size": motion.size(flat)}, Steady(0.0, displacement), runs)
@@ -169,10 +169,7 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run numbered runs; repeat those with too many turning points, with more room for each.
-
-    The repeated ones are run fewer at a time.
-    """
+    """Run numbered runs; repeat those with too many turning points, fewer at a time, with more room for each."""
     part = part_of(flat, numbers)
     least = options.least_swing
     part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
@@ -201,8 +198,8 @@ def _run_with_room(
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
     """Run a batch within the allowance, if there is one.
 
-    Each run gets an equal share of the steps left. Runs for which that does not suffice, usually a few, are run again
-    alone with what the others have left over. Raises Exhausted if that is hardly more.
+    Each run gets an equal part of the remaining steps. The few runs for which that does not suffice are repeated with
+    the steps that the others left. Raises Exhausted if these hardly exceed the first part.
     """
     allowance = current_allowance()
     if allowance is None:
@@ -223,7 +220,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
 
 
 def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
-    """Return the runs of a batch with some numbers; what all runs share stays."""
+    """Return the runs of a batch with some numbers; common values stay."""
     if len(which) == len(batch.starts):
         return batch
     own = {
@@ -235,7 +232,7 @@ def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
 
 
 def _empty_like(results: Results, runs: int) -> Results:
-    """Room for the results of so many runs, as much for each as these have."""
+    """Return empty arrays for so many runs, of the sizes of the given results."""
     return empty_results(runs, results.turn_times.shape[1], *results.samples.shape[1:])
 
 
@@ -253,7 +250,7 @@ def options_of(options: RunOptions) -> BatchOptions:
 
 
 def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Results, threads: int | None) -> None:
-    """Have threads take the runs of a chunk from a queue, without the interpreter's lock.
+    """Let threads take the runs of a chunk from a queue, without the interpreter's lock.
 
     Raises Overtaken if nobody waits for them any more.
     """

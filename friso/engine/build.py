@@ -1,4 +1,4 @@
-"""Builds kernels, and the loops that run them, in the process that fills the cache (`friso.engine.builder`)."""
+"""Build kernels, and the loops that run them, in the process that fills the cache (`friso.engine.builder`)."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Compile the kernel that a pickled task asks for, and keep it in a folder of the cache.
+    """Compile the kernel of a pickled task, or without a task the driver, into a folder of the cache.
 
-    Without a task it is the driver. Returns the name of the entry.
+    Returns the name of the entry.
     """
     if not task:
         return keep(folder, inspect.getsource(driver), _loops_code)
@@ -43,7 +43,7 @@ def build(folder: Path, task: bytes) -> str:
 
 @cache
 def _load(plug_in: PlugIn) -> None:
-    """Load a plug-in once, however many tasks need it: it registers names."""
+    """Load a plug-in once, which registers its names."""
     plug_in.load()
 
 

@@ -1,8 +1,7 @@
-"""Run the program that fills the cache: ``python -m friso.engine.builder FOLDER``.
+"""Program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
 It receives pairs, the name of a module and a task (`friso.platform.helper_process`). The module's `build(folder, task)`
-compiles for the task into the cache's FOLDER. The program answers the name of the entry, or the OSError that prevented
-it.
+compiles the task into the cache's FOLDER. The program returns the name of the entry, or the OSError that prevented it.
 """
 
 from __future__ import annotations
@@ -15,11 +14,11 @@ from pathlib import Path
 from friso.platform.helper_process import answer_questions
 
 GARBAGE = 100_000, 50, 100
-"""Threshold of the garbage collector: the usual one takes a tenth of the time."""
+"""Thresholds of the garbage collector. With the usual ones collection takes a tenth of the time."""
 
 
 def main(folder: Path) -> None:
-    """Build what is asked for."""
+    """Build the requests that arrive."""
     gc.set_threshold(*GARBAGE)
 
     def built(asked: tuple[str, bytes]) -> str | OSError:

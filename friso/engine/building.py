@@ -1,8 +1,7 @@
-"""Compile code that is missing in the cache in separate processes,
-as many at a time as there are cores.
+"""Compile code that is missing in the cache in separate processes, as many at a time as there are cores.
 
-With separate processes, the code that runs is always the code on file, loaded from the cache. A command that finds
-everything compiled loads neither SymPy nor a compiler's front end.
+With separate processes, the running code is always loaded from the cache. A command that finds everything compiled
+loads neither SymPy nor a compiler's front end.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ _PATIENCE = 0.1
 """Time [s] between checks that a build is still needed."""
 
 _AT_THE_END = 2.0
-"""Time [s] to wait at the end of the process until builders have ended."""
+"""Time [s] for which the process waits at its end until builders have ended."""
 
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
-    """Return the cache entries requested; missing ones are built, and messages are logged.
+    """Return the requested cache entries, and build missing ones, with messages in the log.
 
     Raises RuntimeError with the builder's message if that fails, OSError if no folder can be written, and Overtaken if
-    nobody waits for them any more; what is being built is then finished for whoever asks next.
+    nobody waits for them any more; builds in progress are then finished for later requests.
     """
     requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
@@ -66,7 +65,7 @@ class _Work:
         self._jobs: dict[CodeRequest, _Job] = {}
 
     def finish(self, requests: list[CodeRequest]) -> None:
-        """Meet all requests.
+        """Fulfil all requests.
 
         If this ends early, jobs for which nobody else waits are ended; if it is overtaken, jobs already being built go
         on.
@@ -93,9 +92,9 @@ class _Work:
         wait([job.met for job in jobs], _AT_THE_END)
 
     def _joined(self, request: CodeRequest, place: str) -> _Job:
-        """Return the job of a request with one more waiting for it; begin it if there is none.
+        """Return the job of a request, started if necessary, with its count of waiting threads raised.
 
-        A job that was given up is begun again.
+        An abandoned job is started again.
         """
         with self._turn:
             job = self._jobs.get(request)
@@ -107,7 +106,7 @@ class _Work:
             return job
 
     def _leave(self, jobs: list[_Job], overtaken: bool) -> list[_Job]:
-        """Wait for jobs no longer; those that are given up, since nobody else does."""
+        """Stop waiting for jobs; return the abandoned ones, for which nobody else waits."""
         with self._turn:
             for job in jobs:
                 job.waiting -= 1
@@ -117,7 +116,7 @@ class _Work:
         return left
 
     def _do(self, job: _Job) -> None:
-        """Build one job in a process, and hand its result to all threads that wait for it."""
+        """Build one job in a process, and pass its result to all waiting threads."""
         error: BaseException | None = None
         try:
             job.meet()
@@ -136,12 +135,12 @@ _works: dict[int, _Work] = {}
 
 
 def _work() -> _Work:
-    """Return the work of this process: one that was forked has its own."""
+    """Return the builds of this process; a forked process has its own."""
     return _works.get(os.getpid()) or _works.setdefault(os.getpid(), _Work())
 
 
 def _wait(jobs: list[_Job]) -> None:
-    """Wait until all jobs are done. Raises what the first of them to fail has raised."""
+    """Wait until all jobs are done. Raises the error of the first job that failed."""
     waiting = {job.met for job in jobs}
     while waiting:
         go_on()
@@ -153,10 +152,10 @@ def _wait(jobs: list[_Job]) -> None:
 
 
 class _Job:
-    """A request to build a cache entry, on its way to being met.
+    """A request to build a cache entry, in progress.
 
-    `place` tells which of how many it is, `waiting` how many wait for it, `builds` whether it is being built, and
-    `given_up` whether it was abandoned.
+    `place` is its number among all, `waiting` the number of waiting threads, `builds` tells whether it is being built,
+    and `given_up` whether it was abandoned.
     """
 
     def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
@@ -167,20 +166,20 @@ class _Job:
         self._builder: _Builder | None = None
 
     def give_up(self) -> None:
-        """Have it end as soon as may be."""
+        """Abandon the job as soon as possible."""
         self.given_up = True  # before the builder is ended: one that starts now ends itself
         if builder := self._builder:
             builder.kill()
 
     def announce(self) -> None:
-        """Tell whoever waits for it, once, that it is being built."""
+        """Announce once to all waiting threads that the job is being built."""
         asker = ASKER.get()
         if self.builds and asker not in self._announced:
             self._announced.add(asker)
             logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
 
     def meet(self) -> None:
-        """Meet the request."""
+        """Fulfil the request."""
         with self._held(self.request.lock()):
             if self.request.entry() is None:  # no other process has built it meanwhile
                 with self._core():
@@ -188,7 +187,7 @@ class _Job:
 
     @contextmanager
     def _held(self, lock: FileLock) -> Iterator[None]:
-        """Hold the lock of what is requested, once no other process does."""
+        """Hold the lock of the request, once no other process does."""
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -200,7 +199,7 @@ class _Job:
 
     @contextmanager
     def _core(self) -> Iterator[None]:
-        """Have one of the cores, and build."""
+        """Occupy a core while building."""
         while not self._cores.acquire(timeout=_PATIENCE):
             self._go_on()
         try:
@@ -215,7 +214,7 @@ class _Job:
             raise RuntimeError("the kernels were not compiled: interrupted")
 
     def _built(self) -> str:
-        """Build what is requested by an idle builder if there is one; return the name of the entry."""
+        """Build the request with an idle builder if there is one; return the name of the entry."""
         surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(sys.path), self.request.plug_ins)
         while True:
             waiting = _taken(surroundings)
@@ -235,9 +234,9 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Surroundings:
-    """Conditions under which a builder was started; another builder is needed if they change.
+    """Conditions under which a builder was started: process, cache, places of modules, plug-ins.
 
-    They are the process (a forked one has no builder of its own), the cache, the places of modules, and the plug-ins.
+    Another builder is needed if they change.
     """
 
     process: int
@@ -247,16 +246,16 @@ class _Surroundings:
 
 
 class _Builder(HelperProcess):
-    """A process that builds what it is sent (`friso.engine.builder`)."""
+    """A process that builds the requests it receives (`friso.engine.builder`)."""
 
     def __init__(self, surroundings: _Surroundings) -> None:
         self.surroundings = surroundings
         super().__init__("friso.engine.builder", str(surroundings.folder), paths=surroundings.paths)
 
     def build(self, request: CodeRequest) -> str:
-        """Build what is requested; return the name of its entry, or "" if the process ended.
+        """Build a request; return the name of its entry, or "" if the process ended.
 
-        Raises OSError if the entry cannot be kept.
+        Raises OSError if the entry cannot be stored.
         """
         try:
             answer = self.ask((request.builder, request.task))

@@ -1,12 +1,13 @@
-"""Compiled code on disk, private to the user.
+"""Store compiled code on disk, private to the user.
 
-An entry is a file with machine code and the module that it was made of. What is loaded is what this user alone can
-have written (`private.py`) and what bears friso's seal (`seal.py`); anything else is built anew. Locks keep processes
-that build at the same time out of each other's way.
+An entry is a file with machine code and its module. Only code that this user alone can have written (`private.py`) and
+that bears friso's seal (`seal.py`) is loaded; anything else is built anew. Locks separate processes that build at the
+same time.
 
-An entry is named after what was generated, the compiler and the processor; a request, after what was asked for and
-friso's own sources, names its entry. So a start with friso unchanged generates nothing, and a change of friso that
-leaves the generated code as it was compiles nothing. What has not been used for long is deleted (`prune`).
+An entry is named after the generated source, the compiler and the processor; a request, named after the task and
+friso's own sources, gives the name of its entry. So a start of an unchanged friso generates nothing, and a change of
+friso that does not change the generated code compiles nothing. Code that has not been used for long is deleted
+(`prune`).
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ logger = logging.getLogger("friso")
 FOLDER_VARIABLE = "FRISO_CACHE_DIR"
 
 ENTRY, REQUEST = ".kernel", ".request"
-"""How the names of files end that hold code, and that name such a file."""
+"""Suffixes of files with code, and of files that name such a file."""
 
 DAY = 86_400.0
-"""In seconds; so often it is noted that something is in use."""
+"""Seconds of a day, the interval at which use is recorded."""
 
 
 @cache
@@ -81,13 +82,13 @@ def cache_folder() -> Path:
 
 
 _UNWRITABLE: list[OSError] = []
-"""Why nothing can be kept in the folder of compiled code."""
+"""Errors that prevented storing compiled code."""
 
 
 def leave_cache(folder: Path, error: OSError) -> None:
-    """Compile kernels into a temporary folder from now on, since this one cannot be written.
+    """Compile kernels into a temporary folder from now on, because this one cannot be written.
 
-    Its disk may be full. Raises the error if the folder is temporary already.
+    Its disk may be full. Raises the error if the folder is already temporary.
     """
     if is_passing(folder):
         raise error
@@ -101,14 +102,14 @@ _LEAVING = Lock()
 
 
 def _in_words(error: OSError | RuntimeError) -> str:
-    """Return why a folder cannot be had, without a number of the system's."""
+    """Return why a folder cannot be used, without the system's error number."""
     if not isinstance(error, OSError):
         return str(error)
     return f"{cause_of(error)} ({path_of(error)})".removesuffix(" ()")
 
 
 _PASSING = "friso-kernels-"
-"""First letters of the name of a temporary folder that holds a cache."""
+"""Prefix of the names of temporary cache folders."""
 
 
 def is_passing(folder: Path) -> bool:
@@ -117,14 +118,14 @@ def is_passing(folder: Path) -> bool:
 
 
 def remove_if_passing(folder: Path) -> None:
-    """Remove a cache that is in a temporary folder."""
+    """Remove a cache in a temporary folder."""
     if is_passing(folder):
         remove_folder(folder.parent)
 
 
 @cache
 def code_digest(*parts: str) -> str:
-    """Return a digest of the sources in these folders and files, paths from the package friso."""
+    """Return a digest of the sources in these folders and files, given by paths from the package friso."""
     code = hashlib.sha256()
     for part in parts:
         place = Path(__file__).parent.parent / part
@@ -155,7 +156,7 @@ class Compiled:
     code: bytes
 
     def module(self) -> ModuleType:
-        """Return the module, run."""
+        """Return the module after execution."""
         return _module(self.name, self.source, marshal.loads(self.bytecode))
 
 
@@ -163,8 +164,8 @@ class Compiled:
 class CodeRequest:
     """Request to compile code.
 
-    It has the full `name`, a `title` for people, and the task. `build(folder, task)` of its module stores the code in
-    the cache (`keep`) and returns the name of the entry. The digests of the plug-ins that it loads belong to it.
+    It has the full `name`, a `title` for messages, and the task. `build(folder, task)` of its module stores the code in
+    the cache (`keep`) and returns the name of the entry. The digests of loaded plug-ins belong to it.
     """
 
     name: str
@@ -180,15 +181,15 @@ class CodeRequest:
         return cache_folder() / f"{_digest(*asked)}{REQUEST}"
 
     def lock(self) -> FileLock:
-        """Held by who builds what is requested; a request for something else may share it."""
+        """Return the lock of the request, which requests for other code may share."""
         return FileLock(cache_folder() / f"{self.file.name[:2]}.request-lock", mode=0o600)
 
     def answer(self, name: str) -> None:
-        """Keep the name of the entry."""
+        """Store the name of the entry."""
         write_sealed(self.file, name.encode("ascii"))
 
     def entry(self) -> Compiled | None:
-        """Return the entry, intact; None where there is none. That it is in use is noted."""
+        """Return the intact entry, or None, and record its use."""
         file = self.file
         name = (read_sealed(file) or b"").decode("ascii")
         if not re.fullmatch("[0-9a-f]{24}", name):
@@ -210,15 +211,15 @@ def _note_use(*files: Path) -> None:
 
 
 def _stored(file: Path) -> Compiled | None:
-    """Return the entry in a file, None where there is none that friso wrote there."""
+    """Return the entry in a file; None for one that friso did not write."""
     content = read_sealed(file)
     return None if content is None else Compiled(file.stem, *marshal.loads(content))
 
 
 def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> str:
-    """Keep a module and the machine code that `code_of` makes of it in the cache `folder`.
+    """Store a module and its machine code, made by `code_of`, in the cache `folder`.
 
-    Nothing is written if the same is there already. Returns the name of the entry.
+    An equal entry is not written again. Returns the name of the entry.
     """
     name = _digest(_without_words(source), _compiled_with(), environment())
     file = folder / f"{name}{ENTRY}"
@@ -231,20 +232,17 @@ def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> s
 
 
 def entry_lock(file: Path) -> FileLock:
-    """Held by who writes or deletes an entry; another one may share it."""
+    """Return the lock for writing or deleting an entry; entries may share one."""
     return FileLock(file.parent / f"{file.name[:2]}.lock", mode=0o600)
 
 
 def _without_words(source: str) -> str:
-    """Return a module's bytecode without comments, docstrings and line numbers.
-
-    Changes of words thus change nothing.
-    """
+    """Return a module's bytecode without comments, docstrings and line numbers, which thus change nothing."""
     return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 
 def _plain(part: object) -> object:
-    """Return a piece of code, or a constant of it, as what is the same in every process."""
+    """Return a part of code, or a constant, in a form that is equal in every process."""
     if isinstance(part, CodeType):
         names = (part.co_name, part.co_names, part.co_varnames, part.co_freevars, part.co_cellvars)
         takes = (part.co_argcount, part.co_posonlyargcount, part.co_kwonlyargcount, part.co_flags)
@@ -279,22 +277,22 @@ def _file_name(name: str) -> str:
 
 
 class _Loader(InspectLoader):
-    """Loads a module from its code, and tells its source, which is compiled from it."""
+    """Loader of a module from its code, which also returns the source."""
 
     def __init__(self, source: str, compiled: CodeType) -> None:
         self._source, self._compiled = source, compiled
 
     def get_source(self, fullname: str) -> str:
-        """Return the source, for what inspects functions of the module."""
+        """Return the source, for tools that inspect functions of the module."""
         return self._source
 
     def get_code(self, fullname: str) -> CodeType:
-        """Return the code that is run."""
+        """Return the code that is executed."""
         return self._compiled
 
 
 def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
-    """Return the module of an entry, run."""
+    """Return the module of an entry after execution."""
     loader = _Loader(source, compiled)
     spec = spec_from_loader(Path(_file_name(name)).stem, loader)
     assert spec is not None

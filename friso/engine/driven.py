@@ -1,4 +1,4 @@
-"""Many runs of stages that follow one log, sample by sample."""
+"""Run many stages that follow one log, sample by sample."""
 
 from __future__ import annotations
 
@@ -15,17 +15,16 @@ BUDGET = 200
 """Steps that a run may take per sample on average."""
 
 CHUNK, FEWEST, MOST = 4e6, 16, 256
-"""Samples of runs at a time, as the sampled states are kept until they are handed over; and runs at least and at most.
-"""
+"""Samples of all runs in a chunk, limited by memory; fewest and most runs of a chunk."""
 
 
 @dataclass(frozen=True)
 class Inputs:
     """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
 
-    The force has the shape (n,), or (runs, n) where each run has its own. Both come every `sample_time` [s]. The force
-    acts besides the controller's. The velocity at each sample is the central difference of the reference, and linear
-    between samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Both are sampled
+    every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and linear between
+    samples. The force is linear too, or constant if `held`, as in a sampled drive.
     """
 
     reference: np.ndarray
@@ -40,7 +39,7 @@ class Inputs:
 
     @property
     def segments(self) -> np.ndarray:
-        """Return the pieces of the engine, shape (forces, n + 1, 6): a piece per sample, and the end."""
+        """Return the pieces of the reference for the engine, shape (forces, n + 1, 6): one per sample, and the end."""
         n, force = len(self.reference), np.atleast_2d(self.force)
         rows = np.zeros((len(force), n + 1, 6))
         rows[:, :, 0] = np.arange(n + 1) * self.sample_time
@@ -54,10 +53,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class DrivenRuns:
-    """States of driven runs at the samples, shape (runs, n, states).
-
-    Also what is held from each sample to the next, (runs, n, held).
-    """
+    """States of driven runs at the samples, (runs, n, states), and numbers held between samples, (runs, n, held)."""
 
     numbers: np.ndarray
     states: np.ndarray

@@ -1,6 +1,6 @@
-"""Keeps all lanes busy: loads runs, answers the lanes that want attention, refills a lane as its run ends.
+"""Keep all lanes busy: load runs, serve the lanes that need attention, refill a lane as its run ends.
 
-Compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a model come in
+Compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a model are in
 its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
 """
 
@@ -19,11 +19,11 @@ UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 AXIS_ROWS = len(AXES)
 TONE_ROWS, TURN = len(TONE), 2 * pi
 FOLLOWED = STATISTICS.index("attempted")
-"""So many statistics are what the step itself keeps, in rows from `force_peak` on."""
+"""Number of statistics that the step itself updates, in rows from `force_peak` on."""
 
 
 def between(B, layout, lane, i, theta):
-    """State i of a lane at the fraction theta of the step last tried."""
+    """Return state i of a lane at the fraction theta of the last step."""
     inner = 0.0
     for m in range(layout.dense_terms - 1, -1, -1):
         inner = B[(layout.dense + m * layout.states + i) * layout.lanes + lane] + theta * inner
@@ -50,16 +50,13 @@ def reference_at(B, layout, lane, t, order):
 
 
 def deviation(B, layout, lane, theta):
-    """Position minus reference [m] at the fraction theta of the step last tried."""
+    """Return position minus reference [m] at the fraction theta of the last step."""
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.position, theta) - reference_at(B, layout, lane, t, 0)
 
 
 def deviation_rate(B, layout, lane, theta):
-    """Return velocity minus the reference's velocity [m/s], within the step last tried.
-
-    `theta` is the fraction of the step.
-    """
+    """Return velocity minus the reference's velocity [m/s] at the fraction theta of the last step."""
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
@@ -88,7 +85,7 @@ def find_turn(B, layout, lane, high):
 
 
 def find_entry(B, layout, lane, high, band):
-    """The fraction of the step at which the deviation enters the band, by bisection."""
+    """Return the fraction of the step at which the deviation enters the band, by bisection."""
     low = 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -100,15 +97,15 @@ def find_entry(B, layout, lane, high, band):
 
 
 def moment(B, layout, lane, theta):
-    """Time since the start of the run [s] at the fraction theta of the step last tried."""
+    """Return the time since the start of the run [s] at the fraction theta of the last step."""
     start = B[ROW.start * layout.lanes + lane] + B[ROW.old_time * layout.lanes + lane]
     return start + theta * B[ROW.taken * layout.lanes + lane]
 
 
 def note_entry(B, layout, lane, row, fraction, start, end, band):
-    """Refine the moment at which the deviation last entered the band, within a step.
+    """Refine the time at which the deviation last entered the band, within a step.
 
-    `row` is where it is kept; it came back between start and end.
+    `row` is where it is stored; the deviation came back between start and end.
     """
     if abs(start) > band and abs(end) <= band:
         theta = find_entry(B, layout, lane, fraction, band)
@@ -116,7 +113,7 @@ def note_entry(B, layout, lane, row, fraction, start, end, band):
 
 
 def note_turn(B, layout, lane, fraction, batch, settings, results):
-    """Look at the turning point of the deviation inside the step, if there is one."""
+    """Record the turning point of the deviation inside the step, if there is one."""
     before, after = deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
         return
@@ -138,10 +135,10 @@ def note_turn(B, layout, lane, fraction, batch, settings, results):
 
 
 def keep_turn(B, layout, lane, kind, time, value, least, results):
-    """Keep a maximum (kind 1) or minimum (-1) of a zigzag whose legs are at least `least`.
+    """Store a maximum (kind 1) or minimum (-1) of a zigzag with legs of at least `least`.
 
-    One that follows another of its kind, smaller swings between them not being kept, replaces it if it goes beyond.
-    Those for which there is no room are counted only.
+    An extremum that follows another of its kind, with only smaller swings in between, replaces it if it goes beyond.
+    Extrema without room are only counted.
     """
     j, count = int(B[ROW.run * layout.lanes + lane]), int(B[ROW.turns * layout.lanes + lane])
     times, values, last = results.turn_times[j], results.turn_values[j], count - 1
@@ -158,13 +155,13 @@ def keep_turn(B, layout, lane, kind, time, value, least, results):
 
 
 def write_held(B, layout, lane, row):
-    """Write the numbers that are held behind the states."""
+    """Write the held numbers behind the states."""
     for i in range(layout.held):
         row[layout.states + i] = B[(layout.reference + layout.inputs + i) * layout.lanes + lane]
 
 
 def write_states(B, layout, lane, row):
-    """Write the states as they are, and the numbers that are held."""
+    """Write the present states and the held numbers."""
     for i in range(layout.states):
         row[i] = B[(layout.x + i) * layout.lanes + lane]
     write_held(B, layout, lane, row)
@@ -189,15 +186,14 @@ def note_samples(B, layout, lane, fraction, interval, samples):
 
 
 def reference_of(batch, j):
-    """The number of the reference of run j: all runs may share one."""
+    """Return the number of the reference of run j, 0 if all runs share one."""
     return min(j, batch.segments.shape[0] - 1)
 
 
 def enter_segment(B, layout, lane, j, segment, batch):
-    """Start the next segment of the reference that has a duration.
+    """Start the next segment of the reference that has a duration, or the last one, which ends the run.
 
-    If there is none, the last one only ends the run. A certain segment begins the window over which the extremes of
-    the deviation are taken.
+    One segment opens the window over which the extremes of the deviation are taken.
     """
     segments = batch.segments[reference_of(batch, j)]
     count = segments.shape[0] - 1
@@ -242,7 +238,7 @@ def walk(B, layout, lane, w):
 
 
 def look_up(B, layout, lane, j, tables):
-    """Look up the cells that a lane has come to, those it has not left excepted."""
+    """Look up the table cells of a lane, unless it has not left them."""
     for w in range(layout.place_states.size + 1):
         place, cell = walk(B, layout, lane, w), (layout.cell + w) * layout.lanes + lane
         if place >= B[cell] and place <= B[cell] + 1.0:
@@ -268,7 +264,7 @@ def looked_up(layout, j, i, point, tables):
 
 
 def note_tick(B, layout, lane, settings, results):
-    """Write states, and what is held from now on, of a sample of the drive's clock."""
+    """Write states and newly held numbers at a sample of the drive's clock."""
     next_sample, samples = ROW.next_sample * layout.lanes + lane, results.samples
     k = int(B[next_sample] / settings.interval + 0.5)
     write_states(B, layout, lane, samples[int(B[ROW.run * layout.lanes + lane])][k])
@@ -276,7 +272,7 @@ def note_tick(B, layout, lane, settings, results):
 
 
 def take_samples(B, layout, batch, settings, results):
-    """Let the lanes that have arrived at one take their sample."""
+    """Take the sample of every lane that has reached one."""
     wanting = call_at(layout.locate, B) if layout.clocked else 0
     if wanting:
         for lane in range(layout.lanes):
@@ -290,7 +286,7 @@ def take_samples(B, layout, batch, settings, results):
 
 
 def load_run(B, layout, lane, j, batch, settings):
-    """Put run j at its start into a lane."""
+    """Load run j into a lane, at its start."""
     for row in range(layout.rows):
         B[row * layout.lanes + lane] = 0.0
     B[ROW.run * layout.lanes + lane] = j
@@ -313,7 +309,7 @@ def load_run(B, layout, lane, j, batch, settings):
 
 
 def start_clock(B, layout, lane, j, batch):
-    """Take the first sample at the start; its results act at once, or a little later."""
+    """Take the first sample at the start, whose results act at once or after the delay."""
     late, tables = batch.clocks[j, 1], batch.tables
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late
@@ -346,7 +342,7 @@ def start_run(B, layout, lane, j, batch, settings, results):
 
 
 def idle(B, layout, lane):
-    """Let a lane without a run stand still beside the others."""
+    """Keep a lane without a run at rest beside the others."""
     B[ROW.run * layout.lanes + lane] = -1.0
     B[ROW.stop * layout.lanes + lane] = np.inf
     B[ROW.record_from * layout.lanes + lane] = np.inf
@@ -409,7 +405,7 @@ def look_inside(B, layout, lane, fraction, batch, settings, results):
 
 
 def outcome(B, layout, lane, batch, settings):
-    """Return how the lane's run has ended, or that it goes on."""
+    """Return how the lane's run has ended, or that it continues."""
     if B[ROW.segment * layout.lanes + lane] >= batch.segments.shape[1] - 1:
         return DONE
     if B[ROW.attempted * layout.lanes + lane] >= settings.budget:
@@ -422,7 +418,7 @@ def outcome(B, layout, lane, batch, settings):
 
 
 def hand_over(B, layout, lane, results):
-    """Write what the lane's run has gathered."""
+    """Write the statistics of the lane's run."""
     j = int(B[ROW.run * layout.lanes + lane])
     results.turn_counts[j] = int(B[ROW.turns * layout.lanes + lane])
     write_states(B, layout, lane, results.ends[j])
@@ -439,7 +435,7 @@ def hand_over(B, layout, lane, results):
 
 
 def refill(B, layout, lane, queue, batch, settings, results):
-    """Begin the next run of the queue in a lane; whether there was one."""
+    """Begin the next run of the queue in a lane; return whether there was one."""
     runs = batch.starts.shape[0]
     j = take_next(queue) if settings.cancel[0] == 0 else runs
     if j >= runs:
@@ -449,7 +445,7 @@ def refill(B, layout, lane, queue, batch, settings, results):
 
 
 def run(B, layout, queue, batch, settings, results):
-    """Run the runs that this thread gets from the queue, each in a lane, and write results."""
+    """Run the runs of this thread's share of the queue in lanes, and write results."""
     busy = 0
     for lane in range(layout.lanes):
         if refill(B, layout, lane, queue, batch, settings, results):

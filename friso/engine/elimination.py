@@ -1,7 +1,7 @@
-"""Gaussian elimination of a matrix with known zeros, worked out ahead as straight-line code.
+"""Write Gaussian elimination of a matrix with known zeros as straight-line code.
 
-Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides how many operations there are
-and how long each waits for another; it is searched for, starting from Markowitz's rule.
+Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides the number of operations and
+their waiting times; it is searched, starting from Markowitz's rule.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MULTIPLY, DIVIDE = 4, 13
 """Latency of a fused multiply-add and of a division, in cycles, on current x86-64 processors."""
 
 WORK = 0.5
-"""Cycles that one more vector operation costs where nothing waits for it (two units work side by side)."""
+"""Cycles of one more vector operation that nothing waits for (two units work side by side)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: 
 
 
 def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
-    """Diagonal pivots, the one that causes the fewest products first."""
+    """Return diagonal pivots, the one that causes the fewest products first."""
     pattern, left, order = set(nonzero), set(range(size)), []
     while left:
         rows = {k: [i for i in left if i != k and (i, k) in pattern] for k in left}
@@ -81,7 +81,7 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
     """Return the estimated cycles of a factorisation and `solves` solutions.
 
-    They are the longest wait, and a share for every operation.
+    They are the longest wait, and a part of every operation.
     """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0

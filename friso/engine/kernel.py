@@ -1,4 +1,4 @@
-"""The kernel of a structure: compiled on first use, from the cache afterwards."""
+"""Represent the kernel of a structure, compiled on first use and loaded from the cache afterwards."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ with their drive as built."""
 
 
 STEP, OPERATION, CALL = 3.5, 0.0011, 0.126
-"""Work of a step of a run (see `friso.engine.allowance`): whatever it computes, for each operation in its source, and
-for each call of a function such as an exponential. Of 33 kernels, measured on 25 November 2026, that tells the time to
-30 %; they take 63 to 280 ns a step."""
+"""Work of a step of a run (see `friso.engine.allowance`): a constant, a term for each operation in its source, and one
+for each call of a function such as an exponential. Fitted to 33 kernels on 25 November 2026, to 30 %; they take 63
+to 280 ns a step."""
 
 _STEP = re.compile(r"^def step\(.*?(?=^def |\Z)", re.DOTALL | re.MULTILINE)
 _OPERATIONS = re.compile(r"[-+*/]")
@@ -49,8 +49,8 @@ _CALLS = re.compile(r"\b(?:exp|gaussian|power|sqrt|tanh|sine|log|clipped)\(")
 class Kernel:
     """A generated module with its machine code and the loops that run it.
 
-    It has the names of states, of numbers held between samples, of parameters and outputs. It also has its layout with
-    the addresses of the machine code, and its source.
+    It has the names of states, of numbers held between samples, of parameters and outputs, its layout with the
+    addresses of the machine code, and its source.
     """
 
     module: ModuleType
@@ -68,7 +68,7 @@ class Kernel:
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
     def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
-        """Run the runs of the batch that this thread gets from the queue; write the results."""
+        """Run the runs of this thread's share of a batch, and write the results."""
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:
@@ -88,12 +88,12 @@ class Kernel:
 
     @property
     def position(self) -> int:
-        """Return which state is the position of the stage, the one that is measured."""
+        """Return the index of the state that is the measured position of the stage."""
         return self.layout.position
 
     @property
     def velocity(self) -> int:
-        """Return which state is the velocity of the stage."""
+        """Return the index of the state that is the velocity of the stage."""
         return self.layout.velocity
 
     @property
@@ -106,33 +106,33 @@ class Kernel:
 
     @property
     def cart_velocity(self) -> int:
-        """Return which state is the velocity of what the friction acts on."""
+        """Return the index of the state that is the velocity of the body with friction."""
         return self.module.CART_VELOCITY
 
     def having(self, role: Role) -> list[int]:
-        """Return which of the states and of the numbers held have a role."""
+        """Return the indices of states and held numbers with a role."""
         return [i for i, state_role in enumerate(self.module.ROLES) if state_role == role]
 
     @property
     def held(self) -> tuple[str, ...]:
-        """Return numbers that are held between samples, and modes that remember, which come last."""
+        """Return the names of numbers held between samples, and of modes that remember, which come last."""
         return self.module.HELD_NAMES
 
     @property
     def full_state(self) -> tuple[str, ...]:
-        """Return all that a run has at an instant: states, then the numbers held."""
+        """Return the names of all values of a run at an instant: states, then held numbers."""
         return self.states + self.held
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """Return the numbers of the modes that remember, among the kinks."""
+        """Return the numbers of the kinks that are modes that remember."""
         return self.module.SWITCHES
 
     @property
     def initial_size(self) -> int:
         """Return how many numbers of `full_state` a run starts from.
 
-        The modes with memory follow from these if need be.
+        Modes with memory may follow from them.
         """
         return len(self.full_state) - len(self.switches)
 
@@ -147,18 +147,18 @@ class Kernel:
 
     @property
     def outputs(self) -> dict[str, tuple[str, str]]:
-        """Unit and label of each output."""
+        """Return unit and label of each output."""
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """Return states and numbers held in a steady motion that has lasted, (runs, initial_size).
+        """Return states and held numbers in a steady motion after all transients, (runs, initial_size).
 
         `flat` and the numbers of the motion may be arrays of shape (runs,).
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion that has lasted, from values of the parameters."""
+        """Return states in a steady motion after all transients, from values of the parameters."""
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
@@ -175,7 +175,7 @@ class Kernel:
         return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
-        """Return on which side of each kink runs are, 1 beyond and 0 before, shape (kinks, ...).
+        """Return the side of each kink on which runs are, 1 beyond and 0 before, shape (kinks, ...).
 
         `full` is the full state, or the states alone, (..., ). Modes with memory are taken from it; without them they
         are those in which a run begins in that state.
@@ -244,7 +244,7 @@ _CIRCUMSTANCES = {
     Driven: "following a log",
     AsBuilt: "drive as built",
 }
-"""Words for forms that are not a stage by itself."""
+"""Words for forms that are not a complete stage."""
 
 
 def kernel(
@@ -254,16 +254,16 @@ def kernel(
     lanes: int = LANES,
     along: tuple[str, ...] = (),
 ) -> Kernel:
-    """Return the kernel for a form, stepping by the named method in so many lanes.
+    """Return the kernel for a form, with a step method and a number of lanes.
 
-    A variational one carries a small deviation beside every state, which may be `along` keys of the stage file too
+    A variational one also integrates a small deviation of every state, and optionally `along` keys of the stage file
     (`friso.equations.variational`).
     """
     return kernels([KernelRequest(structure, variational, method, lanes, along)])[0]
 
 
 def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:
-    """Several kernels; what has to be compiled is compiled side by side."""
+    """Return several kernels, compiled side by side where necessary."""
     requests = list(requests)
     missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
     if missing:

@@ -1,4 +1,4 @@
-"""Kinds of what compiled loops (`friso.engine.scalar_code`) are given, and how it is handed over: in 64-bit words."""
+"""Define kinds of arguments of compiled loops (`friso.engine.scalar_code`), and pack them as 64-bit words."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class NumberKind:
-    """A kind of number: "int", "float" or "truth"; the last does not come from outside."""
+    """A kind of number: "int", "float" or "truth"; the last occurs only inside compiled code."""
 
     name: str
 
@@ -22,7 +22,7 @@ class NumberKind:
         return "d" if self.name == "float" else "q"
 
     def words(self, value: Any) -> list[Any]:
-        """Raises TypeError where the value is of another kind, here and in the others."""
+        """Return the words of a number. Raises TypeError for a value of another kind."""
         if not isinstance(value, float if self.name == "float" else int):
             raise TypeError(f"{value!r} where a number is expected: {self.name}")
         return [value]
@@ -33,7 +33,7 @@ _DTYPES = {name: np.dtype(name) for name in ("int64", "float64", "bool")}
 
 @dataclass(frozen=True)
 class ArrayKind:
-    """Arrays of numbers of a type, whose last index runs fastest."""
+    """Arrays of numbers of a type, with the last index running fastest."""
 
     dtype: str
     dimensions: int
@@ -74,7 +74,7 @@ INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
 def argument_kind(example: Any) -> CompiledKind:
-    """Return the kind of an argument. Raises TypeError for what compiled loops are not given."""
+    """Return the kind of an argument. Raises TypeError for arguments that compiled loops do not take."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
     names = getattr(example, "_fields", None)

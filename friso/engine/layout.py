@@ -10,7 +10,7 @@ from itertools import accumulate
 from friso.engine.processor import processor
 
 LANES = processor().lanes
-"""Runs side by side: one register of float64."""
+"""Number of runs side by side: one register of float64."""
 
 SCALARS = (
     "time",
@@ -35,27 +35,25 @@ SCALARS = (
     "turns",
     "last_kind",
 )
-"""Rows of one number per lane. time, old_time, stop: now, before the step and at its next corner, all since the last
-corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and step last tried;
-fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
-last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
+"""Names of rows of one number per lane. time, old_time, stop: present time, time before the step and next corner, all
+since the last corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and
+last step; fraction: its accepted part; event: the lane needs attention; turns: number of stored turning points;
+last_kind: kind of the last one, 1 for a maximum, -1 for a minimum."""
 
 DRIVER = ("run", "segment", "inner_before", "outer_before")
-"""Rows of use to the driver alone: the number of the run in the lane, negative where there is none, and of the piece of
-the reference it is in; and how long at most the deviation took to enter the two bands at places where the reference
-stood and which it has left."""
+"""Names of rows that only the driver uses: the number of the lane's run, negative for none, and of its piece of the
+reference; and the longest times of entry into the two bands at places that the reference has left."""
 
 CLOCK = ("period", "tick", "due", "ticked", "noted", "left")
-"""Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the
-sample to be taken next; due: when what follows from it acts, since the last corner of the reference; ticked: 1 where
-the last step ended there; noted: 1 where that sample is to be written down; left: 1 where a cell of a table has been
-left."""
+"""Names of rows for a model with a sampling clock. period: sample time; tick: number of the next sample; due: when its
+result acts, since the last corner of the reference; ticked: 1 if the last step ended there; noted: 1 if that sample
+is to be written; left: 1 if a table cell was left."""
 
 ROW = namedtuple("ROW", SCALARS + CLOCK + DRIVER)(*range(len(SCALARS + CLOCK + DRIVER)))
-"""Numbers of the rows that are the same for every model: the first of the buffer."""
+"""Numbers of the rows common to all models, at the beginning of the buffer."""
 
 AXES = ("first", "density", "last")
-"""The places and the times of a table: where it begins, its points per unit, and the number of its last point."""
+"""Axis of a table: its first place or time, points per unit, and number of the last point."""
 
 SIZES = (
     "lanes",
@@ -73,17 +71,16 @@ SIZES = (
     "degree",
     "tones",
 )
-"""Sizes of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the
-reference, behind which numbers are held; the first of all these that comes from tables, and how many tables are over
-places; 1 where the drive has a clock; which states are position and velocity of the stage; and the degree and the tones
-of its reference."""
+"""Names of the sizes of a model: lanes, states, terms of the dense output of each, constants, kinks, reference inputs,
+held numbers; the first held number from tables, and the number of tables over position; 1 for a drive with a clock;
+the indices of position and velocity of the stage; degree and tones of the reference."""
 
 LOOKED_UP = ("seen_states", "place_states", "walked")
-"""Arrays of a model whose drive has a clock: the states that it measures, those that tables are looked up over, and
-over which of these, or time after them, each table is."""
+"""Names of arrays of a model with a clock: measured states, states over which tables are looked up, and for each table
+the index of that state (or of time, after them)."""
 
 FUNCTIONS = ("step", "locate", "update")
-"""Functions written for each model, which the driver calls."""
+"""Names of the functions written for each model, which the driver calls."""
 
 BLOCKS = (
     "x",
@@ -101,21 +98,22 @@ BLOCKS = (
     "base",
     "slope",
 )
-"""Blocks of rows whose first row depends on the model; after the last of them the buffer ends."""
+"""Names of blocks of rows whose first row depends on the model; the buffer ends after the last."""
 
 ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", "stands_since", *LOOKED_UP, *FUNCTIONS))
-"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions. Behind the rows
-that a module numbers comes one of use to the driver alone: since when the reference stands."""
+"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions.
+
+One further row holds the time since which the reference stands."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Layout of the buffer in which the driver keeps the runs of a model.
+    """Layout of the buffer in which the driver stores the runs of a model.
 
     `walks` are the quantities over which tables are looked up: states, and time. For each, a `cell` is the interval
-    between two points of its tables, in which every table has a `base` and a `slope`. `piece_before` holds the length
-    and the inputs of the previous piece of the reference, because a sample may lie there whose command acts only after
-    the corner.
+    between two points of its tables, with a `base` and a `slope` for every table. `piece_before` has the length and the
+    inputs of the previous piece of the reference, because a sample may lie there whose command acts only after the
+    corner.
     """
 
     states: int

@@ -1,4 +1,4 @@
-"""Machine code: made by LLVM from its own language, loaded from object files, and called."""
+"""Make machine code by LLVM from its language, load object files, and call their functions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def object_code(module: ir.Module) -> bytes:
 
 
 def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
-    """Return a module as LLVM has rewritten it for a processor."""
+    """Return a module as optimised by LLVM for a processor."""
     parsed = llvm.parse_assembly(str(module))
     parsed.triple, parsed.data_layout = machine.triple, str(machine.target_data)
     parsed.verify()
@@ -35,7 +35,7 @@ def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
 
 
 def load_object(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
-    """Load an object file, and return the addresses of the functions named.
+    """Load an object file, and return the addresses of the named functions.
 
     It stays loaded until the process ends. Raises RuntimeError if it cannot be linked.
     """
@@ -64,5 +64,5 @@ class Loops:
         self._call, self._packing = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address), Packing(kinds)
 
     def __call__(self, *arguments: Any) -> None:
-        """Raises TypeError for arguments of other kinds than those the loops were compiled for."""
+        """Call the loops. Raises TypeError for arguments of other kinds than compiled for."""
         self._call(self._packing.packed(arguments))

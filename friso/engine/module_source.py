@@ -1,6 +1,6 @@
-"""Writes the module of a model: its kernel, and the NumPy functions that prepare its runs and read its states.
+"""Write the module of a model: its kernel, and the NumPy functions that prepare its runs and read its states.
 
-A module needs no SymPy to run, so that a warm start loads neither the equations nor their derivatives.
+A module needs no SymPy to run, so a warm start loads neither the equations nor their derivatives.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from friso.engine.simd_math import clipped, exp, gaussian, power, quantised, sin
 
 
 _LOG = "from friso.engine.simd_math import log"
-"""Import for the few modules with the derivative of a power to its exponent."""
+"""Import for modules with the derivative of a power by its exponent."""
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
@@ -68,7 +68,7 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
 
 
 def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
-    """Sizes of the model, by the names of `friso.engine.layout.SIZES`."""
+    """Return the sizes of the model, by the names of `friso.engine.layout.SIZES`."""
     clock, layout, form = model.clock, writer.layout, model.reference
     smooth = {"degree": form.degree, "tones": form.tones} if form != QUADRATIC else {}
     return {
@@ -86,14 +86,14 @@ def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
 
 
 def _places(model: Model, body: Body) -> tuple[int, int]:
-    """Return which states are position and velocity of a body."""
+    """Return the indices of the states that are position and velocity of a body."""
     return model.symbols.index(body.position), model.symbols.index(body.velocity)
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return which states a sampled drive measures, and which its tables are looked up over.
+    """Return the indices of states that a sampled drive measures, and over which its tables are looked up.
 
-    Also return, for each table, the index of what it is looked up over.
+    Also returns, for each table, the index of that state.
     """
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()

@@ -1,8 +1,7 @@
-"""Work that nobody waits for any more ends: whoever asks for it has a flag, which another thread sets. And work that
-takes long waits while something is computed at which somebody looks.
+"""End work that nobody waits for, and let urgent work of the app go first.
 
-What runs when the flag is set is incomplete; so nothing is made of it, and nothing kept: `Overtaken` is raised at the
-next batch of runs, through everything that handles errors.
+Whoever asks for work has a flag, which another thread sets to cancel it. Runs are incomplete once the flag is set, so
+nothing is made of them: `Overtaken` is raised at the next batch of runs, through all error handling.
 """
 
 from __future__ import annotations
@@ -17,18 +16,18 @@ import numpy as np
 
 
 class Overtaken(BaseException):
-    """Nobody waits for this work any more."""
+    """Error: nobody waits for this work any more."""
 
 
 _FLAG: ContextVar[np.ndarray | None] = ContextVar("flag", default=None)
 
 
 ASKER: ContextVar[object] = ContextVar("asker", default=None)
-"""The question of the app for which a computation runs, and which receives its messages; None on the command line."""
+"""The question of the app that a computation belongs to, which receives its messages; None on the command line."""
 
 
 def current_flag() -> np.ndarray:
-    """Return the flag that cancels runs: of `ended_by`, or an unset one."""
+    """Return the flag that cancels runs: that of `ended_by`, or an unset one."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 
@@ -47,7 +46,7 @@ def ended_by(flag: np.ndarray) -> Iterator[None]:
 
 
 def go_on() -> None:
-    """Give way to what goes first. Raises Overtaken once the flag is set."""
+    """Wait while urgent work runs. Raises Overtaken once the flag is set."""
     if _ahead and not is_first():
         _give_way()
     flag = _FLAG.get()
@@ -56,8 +55,8 @@ def go_on() -> None:
 
 
 AHEAD = 0.5
-"""Longest time [s] for which a question goes first. A longer one is no longer watched, and a kernel that has to be
-compiled for it must keep nobody waiting."""
+"""Longest time [s] for which a question has priority. A longer one is no longer watched, and the compilation of its
+kernel must not keep others waiting."""
 
 _FIRST: ContextVar[bool] = ContextVar("first", default=False)
 _ahead: dict[object, float] = {}
@@ -66,10 +65,7 @@ _turn = Condition()
 
 @contextmanager
 def going_first() -> Iterator[None]:
-    """Give priority to runs within the block: other work of this process waits meanwhile.
-
-    It waits at its next batch of runs.
-    """
+    """Give priority to runs within the block: other work of this process waits at its next batch of runs."""
     token, own = _FIRST.set(True), object()
     with _turn:
         _ahead[own] = time.monotonic() + AHEAD
@@ -83,7 +79,7 @@ def going_first() -> Iterator[None]:
 
 
 def is_first() -> bool:
-    """Tell whether what runs now goes first."""
+    """Tell whether the present work has priority."""
     return _FIRST.get()
 
 

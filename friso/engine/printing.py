@@ -1,4 +1,4 @@
-"""SymPy expressions as straight-line Python for the kernels and as NumPy for everything else."""
+"""Print SymPy expressions as straight-line Python for the kernels, and as NumPy elsewhere."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Rename = Callable[[sp.Symbol], str]
 
 
 class reciprocal(sp.Function):
-    """1/x, kept apart from powers so that x^-1 and x^-2 share one division."""
+    """Reciprocal 1/x, separate from powers so that x^-1 and x^-2 share one division."""
 
 
 def reciprocals(expr: Any) -> Any:
-    """`expr` with every negative whole power written as a power of a reciprocal."""
+    """Return an expression with every negative whole power written as a power of a reciprocal."""
 
     def negative_power(e: Any) -> bool:
         return e.is_Pow and e.exp.is_Integer and e.exp < 0
@@ -26,7 +26,7 @@ def reciprocals(expr: Any) -> Any:
 
 
 class _KernelPrinter(PythonCodePrinter):
-    """Print expressions as scalar code that calls no library but `friso.engine.simd_math`."""
+    """Printer of expressions as scalar code that calls only `friso.engine.simd_math`."""
 
     def __init__(self, rename: Rename) -> None:
         super().__init__({"fully_qualified_modules": False})
@@ -73,7 +73,7 @@ class _KernelPrinter(PythonCodePrinter):
 
 
 def print_scalar(expr: Any, rename: Rename) -> str:
-    """One expression as kernel code."""
+    """Return an expression as kernel code."""
     return str(_KernelPrinter(rename).doprint(expr))
 
 
@@ -95,7 +95,7 @@ class _Renamed(NumPyPrinter):
         return f"np.clip({value}, -({limit}), {limit})"
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
-        """As `where` in `where`: quicker than the `select` of SymPy's own."""
+        """Print cases as nested `where`, which is faster than the `select` of SymPy."""
         text = "np.nan"
         for case in reversed(expr.args):
             result, condition = case.args
@@ -108,12 +108,12 @@ class _Renamed(NumPyPrinter):
 
 
 def print_numpy(expr: sp.Expr, rename: Rename) -> str:
-    """One expression as NumPy code that broadcasts."""
+    """Return an expression as NumPy code that broadcasts."""
     return str(_Renamed(rename).doprint(expr))
 
 
 class Constants:
-    """Collects the subexpressions that a whole run shares, so that a kernel finds them computed."""
+    """Subexpressions that are constant over a run, collected to be computed once."""
 
     def __init__(self, parameters: Iterable[sp.Symbol]) -> None:
         self._parameters = frozenset(parameters)
@@ -128,7 +128,7 @@ class Constants:
         return {symbol: i for i, symbol in enumerate(self._symbols.values())}
 
     def hoist(self, expr: Any) -> Any:
-        """Replace every largest subexpression in parameters alone by a constant's symbol."""
+        """Replace every largest subexpression in parameters alone by the symbol of a constant."""
         if expr.is_number or not expr.free_symbols & self._parameters:
             return expr
         if expr.free_symbols <= self._parameters:

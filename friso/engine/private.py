@@ -1,7 +1,7 @@
-"""Files and folders that nobody but this user and root can have written.
+"""Read and write files that only this user and root can have written.
 
-A folder is judged from the root down: once a folder belongs to the user or to root and nobody else may write to it,
-nobody else can exchange what is in it. A file is opened without following links and judged by its descriptor.
+A folder is checked from the root down: if it belongs to the user or to root and nobody else may write to it, nobody
+else can exchange its contents. A file is opened without following links and checked by its descriptor.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from friso.platform.whole_file import FOR_USER, whole_file
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder for this user alone, with missing ones above it.
+    """Make a folder for this user alone, with missing parents.
 
-    One of the user's own is closed to others. Raises PermissionError if another user could exchange the folder, or one
-    on the way: if it is another user's, others may write to it, or it is a symbolic link. Raises OSError if it cannot
+    A folder of the user is closed to others. Raises PermissionError if another user could exchange the folder, or a
+    parent: if it belongs to another user, others may write to it, or it is a symbolic link. Raises OSError if it cannot
     be made.
     """
     folder = folder.absolute()
@@ -56,6 +56,6 @@ def read_private(path: Path) -> bytes:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file for this user alone, whole or not at all. Raises OSError."""
+    """Write a file for this user alone, completely or not at all. Raises OSError."""
     with whole_file(path, FOR_USER) as file:
         file.write(content)

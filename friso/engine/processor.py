@@ -1,4 +1,4 @@
-"""The processor that code is compiled for."""
+"""Describe the processor for which code is compiled."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from functools import cache
 import llvmlite.binding as llvm
 
 PROCESSOR_VARIABLE = "FRISO_PROCESSOR"
-"""Names a lesser processor of the same family to compile for, as LLVM calls it: x86-64-v3, say, has AVX2 but not
-AVX-512. For `python -m benchmarks.processors`, and for a cache that different machines share."""
+"""Environment variable with a lesser processor of the same family to compile for, by its LLVM name: x86-64-v3 has AVX2
+but not AVX-512. For `python -m benchmarks.processors`, and for a cache that different machines share."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Processor:
 
     @property
     def lanes(self) -> int:
-        """Return how many float64 a register holds.
+        """Return the number of float64 in a register.
 
-        8 with AVX-512, 4 with AVX, 2 with SSE2 and NEON. More of them side by side are no faster, and take longer to
-        compile (docs/platforms.md).
+        It is 8 with AVX-512, 4 with AVX, 2 with SSE2 and NEON. More lanes are no faster, and take longer to compile
+        (docs/platforms.md).
         """
         features = self.features.split(",")
         if "+avx512f" in features or self.name == "x86-64-v4":
@@ -47,7 +47,7 @@ class Processor:
 
 @cache
 def processor() -> Processor:
-    """This machine's processor, or the lesser one that the environment names."""
+    """Return this machine's processor, or the lesser one named in the environment."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     triple = loadable(llvm.get_process_triple())

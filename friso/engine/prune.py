@@ -12,14 +12,14 @@ from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
 from friso.platform.whole_file import PARTIAL
 
 KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
-"""How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""
+"""Time [s] after which unused code is deleted, and size [bytes] of the cache; code used within a day stays."""
 
 
 def prune(folder: Path) -> None:
     """Delete compiled code that has not been used for long, and leftovers of killed processes.
 
-    If the folder is still too large, the code unused for longest goes next. Files that another process is writing are
-    left alone.
+    If the folder is still too large, the code unused for longest is deleted next. Files that another process is writing
+    stay.
     """
     try:
         with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
@@ -35,7 +35,7 @@ def prune(folder: Path) -> None:
 
 
 def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
-    """Yield when each entry, request and draft was used last [s], and its size [bytes]."""
+    """Yield the last use of each entry, request and draft [s], with its path and size [bytes]."""
     for file in folder.iterdir():
         if file.suffix in (ENTRY, REQUEST, PARTIAL):
             status = file.lstat()

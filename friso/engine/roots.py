@@ -1,5 +1,7 @@
-"""The first zero of a kink's surface inside a step, from its values at both ends and at the thirds; straight-line code
-(`friso.engine.vector_code`)."""
+"""Find the first zero of a kink's surface inside a step, from its values at the ends and thirds, as straight-line code.
+
+`friso.engine.vector_code` compiles it.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ from math import sqrt
 
 
 def cubic(p0, p1, p2, p3, theta):
-    """The cubic through p0 at 0, p1 at 1/3, p2 at 2/3 and p3 at 1, at theta."""
+    """Return the cubic through p0 at 0, p1 at 1/3, p2 at 2/3 and p3 at 1, at theta."""
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3
     c3 = -4.5 * p0 + 13.5 * p1 - 13.5 * p2 + 4.5 * p3
@@ -36,7 +38,7 @@ def bracket(p0, p1, p2, p3):
 
 
 def first_guess(p0, p1, p2, p3):
-    """Return about where a cubic first falls below zero from p0 > 0, by a secant; else 2."""
+    """Return approximately where a cubic first falls below zero from p0 > 0, by a secant; else 2."""
     low, high, above, below = bracket(p0, p1, p2, p3)
     guess = low + (high - low) * above / (above - below)
     return guess if high < 2.0 else 2.0

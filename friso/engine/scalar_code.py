@@ -1,12 +1,12 @@
-"""Compiles plain Python loops over numbers and arrays.
+"""Compile plain Python loops over numbers and arrays.
 
-What keeps the lanes busy and what scans turning points is loops that branch. They are a few hundred lines, for which a
-general compiler of Python needs seconds: it has to find out types. Here types follow from the arguments of a call.
+The driver of the lanes and the scan of turning points are loops that branch, of a few hundred lines. A general compiler
+of Python needs seconds for them, because it has to infer types. Here types follow from the arguments of a call.
 
-The language: functions of whole numbers, float64 numbers, truths, arrays and named tuples of these; assignments,
-arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, `return` of a number. What is imported and does
-not change is known beforehand. A variable stays of one kind; arrays are indexed in full, or by their first index, from
-0 on and within their bounds, which is not checked.
+The language has functions of whole numbers, float64 numbers, truths, arrays and named tuples of these; assignments,
+arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, `return` of a number. Imported constants are
+evaluated in advance. A variable stays of one kind; arrays are indexed in full, or by their first index, from 0 on and
+within their bounds, which is not checked.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ def _types(kind: CompiledKind) -> Sequence[ir.Type]:
 def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
     """Translate a function into LLVM code, with a function `run` that calls it.
 
-    `run` takes the address at which the arguments lie one after another (`friso.engine.kinds.Packing`); `kinds` are
-    their types.
+    `run` takes the address of the packed arguments (`friso.engine.kinds.Packing`); `kinds` are their types.
     """
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
@@ -57,7 +56,7 @@ def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) ->
 
 
 def take_next(queue: Any) -> Any:
-    """Take the number at the head of a queue, which no other thread gets too."""
+    """Take the number at the head of a queue, which no other thread then gets."""
     queue[0] += 1
     return queue[0] - 1
 
@@ -84,7 +83,7 @@ class _Value:
 
 @dataclass(frozen=True)
 class _ArrayValue:
-    """An array: where it begins, and its shape."""
+    """An array: its address and shape."""
 
     data: ir.Value
     shape: tuple[ir.Value, ...]
@@ -97,7 +96,7 @@ class _ArrayValue:
 
 @dataclass(frozen=True)
 class _RecordValue:
-    """A named tuple: where it lies, which does not change while the code runs."""
+    """A named tuple at an address, unchanged while the code runs."""
 
     words: ir.Value
     kind: RecordKind
@@ -134,7 +133,7 @@ def _value(parts: Sequence[ir.Value], kind: CompiledKind) -> Any:
 
 
 class _Writer:
-    """Writes functions, each once for the kinds of its arguments."""
+    """Writer of functions, each once for the kinds of its arguments."""
 
     def __init__(self, module: ir.Module) -> None:
         self.module = module
@@ -187,7 +186,7 @@ _PYTHON: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
 }
-"""Operators between numbers that are known beforehand."""
+"""Operators between numbers that are known at compile time."""
 
 _COMPARISONS: dict[type[ast.AST], str] = {
     ast.Lt: "<",
@@ -200,10 +199,10 @@ _COMPARISONS: dict[type[ast.AST], str] = {
 
 
 class _Frame(ast.NodeVisitor):
-    """Writes the statements and expressions of one function for the kinds of its arguments.
+    """Writer of the statements and expressions of one function for the kinds of its arguments.
 
-    A variable that holds a number is a place in memory, which LLVM turns into registers; one that holds an array or a
-    named tuple is another name for it. What is known beforehand stays a Python object until it meets a number.
+    A variable with a number is a place in memory, which LLVM turns into registers; one with an array or a named tuple
+    is another name for it. Compile-time values stay Python objects until they meet a number.
     """
 
     def __init__(self, writer: _Writer, code: ir.Function, scope: dict[str, Any], outside: dict[str, Any]) -> None:

@@ -1,8 +1,7 @@
-"""exp, log, tanh, powers and random numbers in straight-line code (`friso.engine.vector_code`): no library call, no
-branch, no table.
+"""Compute exp, log, tanh, powers and random numbers in straight-line code, without calls, branches or tables.
 
-Mathematics libraries work on one number at a time, so these take the exponent apart by the bits of the number. Relative
-errors are below 1e-15 over the ranges stated; tested against NumPy.
+Mathematics libraries work on one number at a time, so these functions split off the exponent by the bits of the number.
+Relative errors are below 1e-15 over the ranges stated; tested against NumPy. `friso.engine.vector_code` compiles them.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ _TWO52_BITS = 4841369599423283200
 
 
 def bits_of(x):
-    """The bits of a number as a whole number."""
+    """Return the bits of a number as a whole number."""
     return np.float64(x).view(np.int64)
 
 
 def number_of(bits):
-    """The number with these bits."""
+    """Return the number with the given bits."""
     return np.int64(bits).view(np.float64)
 
 
@@ -49,7 +48,7 @@ def exp(x):
 
 
 def log(x):
-    """Natural logarithm of a positive, normal x."""
+    """Return the natural logarithm of a positive, normal x."""
     bits = bits_of(x)
     exponent_bits = (bits - np.int64(_THREE_QUARTERS)) >> np.int64(52)  # rounds so that 0.75 <= m < 1.5
     m = number_of(bits - (exponent_bits << np.int64(52)))
@@ -62,22 +61,22 @@ def log(x):
 
 
 def power(base, exponent):
-    """base^exponent for a positive, normal base."""
+    """Return base^exponent for a positive, normal base."""
     return exp(exponent * log(base))
 
 
 def tanh(x):
-    """Hyperbolic tangent; absolute error below 1e-15."""
+    """Return the hyperbolic tangent, with an absolute error below 1e-15."""
     return 1.0 - 2.0 / (exp(2.0 * x) + 1.0)
 
 
 def clipped(x, limit):
-    """x within plus and minus a limit."""
+    """Return x limited to plus and minus a limit."""
     return min(max(x, -limit), limit)
 
 
 def quantised(x, digit):
-    """x in whole digits, below 2^51 of them; as it is where the digit is 0."""
+    """Return x rounded to multiples of a step, below 2^51 of them; unchanged for a step of 0."""
     rounded = digit * ((x / digit + _ROUNDER) - _ROUNDER)
     return rounded if digit > 0.0 else x
 
@@ -114,7 +113,7 @@ def gaussian(seed, tick):
 
 
 def quarter_sine(turn):
-    """sin(2 pi turn) for up to a quarter of a turn to either side; absolute error below 1e-11."""
+    """Return sin(2 pi turn) within a quarter of a turn to either side; absolute error below 1e-11."""
     x = 6.283185307179586 * turn
     q = x * x
     p = -1.0 / 39916800 + q * (1.0 / 6227020800 - q * (1.0 / 1307674368000))
@@ -122,10 +121,7 @@ def quarter_sine(turn):
 
 
 def sine(turn):
-    """Return sin(2 pi turn) for up to 2^50 turns, with an absolute error below 1e-11.
-
-    The rounding of the turn comes on top.
-    """
+    """Return sin(2 pi turn) for up to 2^50 turns, with an absolute error below 1e-11, plus the rounding of the turn."""
     quarter_later = turn + 0.25
     within = quarter_later - ((quarter_later - 0.5 + _ROUNDER) - _ROUNDER)  # 0 to 1
     return quarter_sine(0.25 - abs(within - 0.5))

@@ -1,4 +1,4 @@
-"""One run of a stage as a time response: `simulate`."""
+"""Simulate one run of a stage as a time response."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SAMPLES = 20_000
-"""Sampling intervals in a run, where none is asked for."""
+"""Default number of sampling intervals in a run."""
 
 RTOL = 1e-9
-"""Usual tolerance: a force limit that winds up, and contacts, multiply errors by up to 1e7, and one run is quick."""
+"""Default tolerance. A force limit that winds up, and contacts, multiply errors by up to 1e7."""
 
 MOST_SAMPLES = 20_000_000
-"""Sampling intervals a run may have: states and outputs then take a few gigabytes."""
+"""Most sampling intervals of a run, whose states and outputs take a few gigabytes."""
 
 
 def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:

@@ -1,7 +1,7 @@
-"""Writes the step of a model: one Rosenbrock step, as straight-line code for one lane (`friso.engine.vector_code`).
+"""Write one Rosenbrock step of a model as straight-line code for one lane (`friso.engine.vector_code`).
 
-Modes (on which side of each kink) are held during a step, so that the right-hand side is
-smooth; where a kink is crossed the step is accepted up to the crossing alone, which the dense output locates.
+Modes (on which side of each kink) are held during a step, so that the right-hand side is smooth; a step that crosses a
+kink is accepted up to the crossing, which the dense output locates.
 """
 
 from __future__ import annotations
@@ -26,42 +26,43 @@ POINTS = ("near", "third", "far", "last")
 """Names of a kink's surface at the start, the thirds and the end of a step."""
 
 HYSTERESIS = 3e-3
-"""A kink counts as crossed this share of the tolerance beyond it, so that a lane that has just crossed it stands
-clear of it, and rounding noise about it crosses nothing."""
+"""Distance beyond a kink, over the tolerance, at which it counts as crossed. A lane that has crossed it is then clear
+of it, and rounding noise crosses nothing."""
 
 
 SAFETY = 0.77
-"""Share of the step that the error estimate would allow: larger values reject more steps than they save."""
+"""Factor on the step that the error estimate would allow. Larger values reject more steps than they save."""
 
 AFTER_KINK = 0.25
-"""Share of the proposed step that is tried after a kink, behind which the motion may be much quicker."""
+"""Factor on the proposed step after a kink, behind which the motion may be much faster."""
 
 
 WIDE = 3.0
-"""A step that begins so many times farther from a kink than a peak about it is narrow, crosses it, and ends beyond the
-peak, or on this side again, is taken again as far as the kink: within it every stage may lie beyond the peak."""
+"""Distance of a step's start from a kink, in widths of the narrow peak about it, beyond which a step that crosses the
+kink and ends beyond the peak, or on this side again, is repeated up to the kink: all of its stages may lie beyond
+the peak."""
 
 ROUNDING = 2e-15
-"""The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
+"""Least hysteresis over the terms of a surface, nine units in their last place."""
 
 UNCHANGED = ("stop", "start", "longest", "next_sample", "record_from", "turns", "last_kind")
-"""Rows that the step leaves as they are."""
+"""Rows that the step does not change."""
 
 UNWATCHED = ("old_time", "taken", "deviation_max", "deviation_min", "inner_exit", "outer_exit")
-"""Rows that are of no use to a model with a clock: its runs are looked at in samples."""
+"""Rows that a model with a clock does not use, because its samples are examined instead."""
 
 NO_SWING = 1e-6
-"""A deviation whose rate stays below this share of the velocity's tolerance turns by rounding noise alone."""
+"""Rate over the velocity's tolerance below which a deviation turns by rounding only."""
 
 HAPPENED = "entered | turned | (now >= next_sample)"
-"""Events that need attention besides the end of a piece of the reference."""
+"""Events that need attention besides the end of a piece of the reference, as an expression."""
 
 DIVERGED = 1e6
-"""A run ends when its deviation is so many times the length scale of the motion."""
+"""Deviation at which a run ends as diverged, in length scales of the motion."""
 
 
 class Block:
-    """Expressions that are evaluated together, with what they share computed once."""
+    """Expressions that are evaluated together, with common subexpressions computed once."""
 
     def __init__(self, named: Mapping[str, Any], constants: Constants) -> None:
         hoisted = [reciprocals(constants.hoist(sp.sympify(e))) for e in named.values()]
@@ -69,7 +70,7 @@ class Block:
         self._named = dict(zip(named, reduced, strict=True))
 
     def code(self, suffix: str, rename: Rename) -> list[str]:
-        """Assignments to the names, each followed by the suffix."""
+        """Return assignments to the names, each followed by the suffix."""
         inner = {symbol: f"{symbol}{suffix}" for symbol, _ in self._shared}
 
         def named(symbol: sp.Symbol) -> str:
@@ -80,7 +81,7 @@ class Block:
 
 
 class StepWriter:
-    """Code of one model's step by one method."""
+    """Writer of the code of one model's step by one method."""
 
     def __init__(self, model: Model, tableau: Tableau) -> None:
         self.model, self.tableau = model, tableau
@@ -121,17 +122,17 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """Return a block that computes how far states jump at a kink, and the states' indices."""
+        """Return a block that computes the jumps of states at a kink, and the states' indices."""
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
-        """Magnitude of a surface that corresponds to the scales of the states."""
+        """Return the magnitude of a surface for the scales of the states."""
         sizes = (sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
         return sum(sizes, start=sp.S.Zero)
 
     def _rounding(self, surface: sp.Expr) -> sp.Expr:
-        """Magnitude of the terms of a surface, on which its rounding error depends."""
+        """Return the magnitude of the terms of a surface, which determines its rounding error."""
         terms = (sp.Abs(sp.diff(surface, x)) * sp.Abs(x) for x in self.model.symbols)
         return sum(terms, start=sp.S.Zero)
 
@@ -154,13 +155,13 @@ class StepWriter:
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """Return the numbers of the modes that remember, among the kinks."""
+        """Return the numbers of the kinks that are modes that remember."""
         return tuple(map(self.model.kinks.index, self.model.switches))
 
     def source(self) -> str:
         """Return a lane's function `step(B, rtol, inner, outer, budget)`.
 
-        It tells whether the lane wants attention.
+        It tells whether the lane needs attention.
         """
         body = [
             *self._load(),
@@ -180,15 +181,15 @@ class StepWriter:
 
     @property
     def walked(self) -> list[int]:
-        """Over which of the walks each table is looked up."""
+        """Return for each table the index of the quantity over which it is looked up."""
         clock = self.model.clock
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """Return a lane's function `locate(B)`; none without a clock.
+        """Return a lane's function `locate(B)`, or nothing without a clock.
 
-        It tells whether the lane has `ticked`, whether a cell of a table has been `left`, and whether a sample is to
-        be `noted`.
+        It tells whether the lane has `ticked`, whether a table cell has been `left`, and whether a sample is to be
+        `noted`.
         """
         if not self.model.clock:
             return ""
@@ -204,7 +205,7 @@ class StepWriter:
         return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
-        """Return how far each walk is from the point at which its cell begins, in cells."""
+        """Return the distance of each quantity from the beginning of its table cell, in cells."""
         lines = []
         for w, x in enumerate(self._walks):
             first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
@@ -215,8 +216,8 @@ class StepWriter:
     def update_source(self) -> str:
         """Return a lane's function `update(B)`.
 
-        It looks up tables and, where the lane has `ticked`, sets the numbers held from the last sample, and the time
-        of the next tick. Modes with memory are kept as at the beginning of the step.
+        It looks up tables and, if the lane has `ticked`, sets the held numbers from the last sample, and the time of
+        the next tick. Modes with memory stay as at the beginning of the step.
         """
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
@@ -250,7 +251,7 @@ class StepWriter:
         return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
 
     def _in_buffer(self) -> Rename:
-        """Return names for what a sample is computed from, most of which is in the buffer."""
+        """Return names for the inputs of a sample, most of which are in the buffer."""
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
@@ -278,9 +279,9 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """Return the next step, at most to the corner of the reference or to the next tick.
+        """Return the code that chooses the next step, at most to the corner of the reference or to the next tick.
 
-        The last two steps before it are made equal.
+        The last two steps before that are made equal.
         """
         return [
             *self._edge(),
@@ -293,7 +294,7 @@ class StepWriter:
         ]
 
     def _edge(self) -> list[str]:
-        """Return where the step ends at the latest.
+        """Return the code for the latest end of the step.
 
         A corner and a tick coincide if they are equal within rounding.
         """
@@ -326,7 +327,7 @@ class StepWriter:
         return lines
 
     def _stage_rates(self, stage: int) -> list[str]:
-        """Stage `stage`: where it stands, and the right-hand side there."""
+        """Write a stage: its state, and the right-hand side there."""
         if stage == 0:
             return []
         row, before = self.tableau.a[stage - 1], self.tableau.a[stage - 2] if stage > 1 else ()
@@ -342,7 +343,7 @@ class StepWriter:
         return " + ".join(f"{w!r} * k{j}_{i}" for j, w in enumerate(weights) if w)
 
     def _error(self) -> list[str]:
-        """End of the step, and the mean square of its error against the tolerance."""
+        """Write the end of the step, and the mean square of its error over the tolerance."""
         last = self.tableau.stages - 1
         lines = [f"end{i} = y{i} + k{last}_{i}" for i in range(self.size)] + ["square = 0.0"]
         controlled = [i for i, state in enumerate(self.model.states) if state.controlled]
@@ -358,14 +359,14 @@ class StepWriter:
         return [f"d{m}_{i} = {self._sum(row, i)}" for m, row in rows for i in range(self.size)]
 
     def _between(self, i: int, theta: str) -> str:
-        """State i at the fraction theta of the step."""
+        """Return state i at the fraction theta of the step."""
         inner = f"d{len(self.tableau.dense) - 1}_{i}"
         for m in range(len(self.tableau.dense) - 2, -1, -1):
             inner = f"d{m}_{i} + {theta} * ({inner})"
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """Return where in the step the first kink is crossed: `fraction`, 1 if none is.
+        """Return the code that finds the first crossing of a kink: `fraction`, 1 if there is none.
 
         `astray` tells that a kink's mode is wrong.
         """
@@ -400,7 +401,7 @@ class StepWriter:
         return [*lines, f"fraction = {call}", "fraction = fraction if earliest < 1.0 else 1.0"]
 
     def _accept(self) -> list[str]:
-        """Accept or reject, the new state and modes, and the next step."""
+        """Write acceptance or rejection, new state and modes, and the next step."""
         n = self.size
         lines = [
             "precise = square <= 1.0",
@@ -436,7 +437,7 @@ class StepWriter:
         ]
 
     def _passed_over(self) -> list[str]:
-        """Tell whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
+        """Write the test whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
@@ -446,10 +447,10 @@ class StepWriter:
         return lines
 
     def _jump(self) -> list[str]:
-        """Let states jump at the kinks just crossed, and let the modes change.
+        """Write the jumps of states and modes at the kinks just crossed.
 
-        Modes with memory change one after the other, because several may change at one instant: the result of the
-        first is the input of the second.
+        Modes with memory change one after the other, because several may change at one instant: the result of the first
+        is the input of the second.
         """
         lines: list[str] = []
         flips = [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
@@ -470,7 +471,7 @@ class StepWriter:
         return [*lines, "root16 = sqrt(root8)", f"factor = {SAFETY!r} / (root16 * sqrt(root16))"]
 
     def _statistics(self) -> list[str]:
-        """Largest force, and what wants attention."""
+        """Write the largest force, and whether the lane needs attention."""
         return [
             *self._followed.code("_n", self._rename("n", "t_n")),
             "force_peak = max(force_peak, abs(force_s))",
@@ -486,9 +487,10 @@ class StepWriter:
         ]
 
     def _between_samples(self) -> list[str]:
-        """Return what is kept of the inside of a step.
+        """Write the statistics inside a step.
 
-        It is the largest force, the extremes of the deviation, when it last left the two bands, and when it turned.
+        They are the largest force, the extremes of the deviation, the last exits from the two bands, and turning
+        points.
         """
         lines = ["now = start + t_n"]
         for where, theta in zip(("p0", "p1", "e"), (*THIRDS, 1.0), strict=True):
@@ -531,7 +533,7 @@ class StepWriter:
         return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in unwritten]
 
     def _store_step(self) -> list[str]:
-        """Write the code that stores the step, from which states inside it are interpolated."""
+        """Write the storage of the step, from which states inside it are interpolated."""
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
         lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
         for m in range(len(self.tableau.dense)):
@@ -540,6 +542,6 @@ class StepWriter:
 
 
 def _function(name: str, arguments: str, lines: list[str]) -> str:
-    """Return a function, for one lane; B is its column of the buffer."""
+    """Return a function for one lane, whose column of the buffer is B."""
     body = "".join(f"    {line}\n" for line in lines)
     return f"def {name}({arguments}):\n{body}"

@@ -1,4 +1,4 @@
-"""The relative tolerance and its limits."""
+"""Check the relative tolerance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ TIGHTEST, LOOSEST = 1e-12, 1e-2
 
 
 def checked_rtol(rtol: float) -> float:
-    """`rtol` if the solver can hold it. Raises InputError otherwise."""
+    """Return `rtol` if the solver can meet it. Raises InputError otherwise."""
     if not TIGHTEST <= rtol <= LOOSEST:
         raise InputError("rtol", f"{rtol:g}", "a number from 1e-12 to 1e-2", "rtol=1e-6")
     return rtol

@@ -27,10 +27,10 @@ from llvmlite import ir
 from friso.engine.simd_math import bits_of, number_of
 
 FASTMATH = ("arcp", "contract", "nsz")
-"""Liberties that compilers may take with float64 numbers."""
+"""Fast-math flags of LLVM that the kernels allow."""
 
 CACHE_LINE = 64
-"""Bytes: a register that straddles two of these lines takes twice as long to load."""
+"""Bytes of a cache line; a register that straddles two takes twice as long to load."""
 
 
 def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
@@ -91,7 +91,7 @@ _PYTHON: dict[type[ast.AST], Callable[..., Any]] = {
     ast.BitAnd: operator.and_,
     ast.BitOr: operator.or_,
 }
-"""Operators between numbers that are known beforehand."""
+"""Operators between numbers that are known at compile time."""
 
 _COMPARISONS: dict[type[ast.AST], str] = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">="}
 
@@ -126,13 +126,13 @@ class _Column:
 
 
 class _Writer:
-    """Writes the instructions of functions."""
+    """Writer of the instructions of functions."""
 
     def __init__(self, builder: Any, lanes: int) -> None:
         self.builder, self.lanes = builder, lanes
 
     def inlined(self, function: Callable[..., Any], arguments: list[Any]) -> Any:
-        """Write what a function does with its arguments; its result."""
+        """Write a function's operations on its arguments; return the result."""
         tree = syntax(function)
         scope = dict(zip((argument.arg for argument in tree.args.args), arguments, strict=True))
         frame = _Frame(self, scope, function.__globals__)
@@ -177,12 +177,12 @@ class _Writer:
         return _Vector(self.builder.fcmp_ordered(sign, *values, flags=FASTMATH), _TRUTH)
 
     def select(self, condition: Any, chosen: Any, otherwise: Any) -> _Vector:
-        """One of two, both of which are known: a choice without a branch."""
+        """Return one of two computed values, chosen without a branch."""
         values, kind = self.together(chosen, otherwise)
         return _Vector(self.builder.select(self.truth(condition).value, *values), kind)
 
     def truth(self, value: Any) -> _Vector:
-        """Tell whether a number is not 0, as Python has it."""
+        """Return whether a number is not 0, as in Python."""
         if isinstance(value, _Vector) and value.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
             return _Vector(self.builder.fcmp_unordered("!=", value.value, zero, flags=FASTMATH), _TRUTH)
@@ -201,7 +201,7 @@ class _Writer:
         return self._library("sqrt", value)
 
     def _library(self, name: str, value: Any) -> _Vector:
-        """One of LLVM's own functions of a number."""
+        """Return the result of one of LLVM's own functions of a number."""
         vector = self._type(_FLOAT)
         signature = ir.FunctionType(vector, [vector])
         called = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.lanes}f64", (), signature)
@@ -242,7 +242,7 @@ _LIBRARY: dict[Any, Callable[..., _Vector]] = {
 
 
 class _Frame(ast.NodeVisitor):
-    """Evaluates the statements and expressions of one function, to vectors or to constants."""
+    """Evaluation of the statements and expressions of one function, to vectors or to constants."""
 
     def __init__(self, writer: _Writer, scope: dict[str, Any], outside: Mapping[str, Any]) -> None:
         self._writer, self._scope, self._outside = writer, scope, outside
@@ -251,7 +251,7 @@ class _Frame(ast.NodeVisitor):
         raise TypeError(f"not in the language of straight-line code: {ast.unparse(node)}")
 
     def visit_Expr(self, node: ast.Expr) -> None:
-        """A docstring, and no other."""
+        """Accept a docstring, and no other expression."""
         if not isinstance(node.value, ast.Constant):
             self.generic_visit(node)
 

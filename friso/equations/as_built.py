@@ -17,22 +17,24 @@ if TYPE_CHECKING:
     from friso.equations.model import Control, Model
 
 STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
-"""What is looked up over position, at every sample: factors of static and Coulomb friction over the cart's, and of the
-motor constant over the stage's."""
+"""Names of the factors that are looked up by position at every sample.
+
+They multiply the cart's static friction, its Coulomb friction, and the stage's motor constant."""
 
 INJECTED, FLOOR = TIMES = ("injected_force", "floor_acceleration")
-"""What is looked up over time: a force [N] added to the command, and the acceleration [m/s^2] of the floor."""
+"""Names of the signals that are looked up by time at every sample.
+
+They are a force [N] added to the command, and the acceleration of the floor [m/s^2]."""
 
 
 READING, COMMANDED = "reading", "commanded"
-"""Names of what is held between samples that the drive logs: the position that its encoder reads [m], and the force
-[N] that it commands."""
+"""Names of the logged numbers of a drive: the encoder's reading [m] and the commanded force [N]."""
 
 RATED = "seen_rated"
-"""The position at the encoder of the velocity, where that is another one."""
+"""Name of the position at the velocity encoder, where the drive has a separate one."""
 
 OF_RATED = 2**50
-"""What its noise adds to the seed of the drive's, larger than any of these."""
+"""Offset of the random seed for the noise of the velocity encoder, larger than any seed of a drive."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class AsBuilt:
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
-    """Return the delay of a drive in whole samples, the remainder being `drive.late`."""
+    """Return the delay of a drive in whole samples; `drive.late` is the remainder."""
     return int(flat.get("drive.delay", 0.0) / flat["drive.sample_time"] * (1 + 1e-9) + 1e-9)
 
 
@@ -73,13 +75,13 @@ NEUTRAL: Mapping[str, float] = {
     "cable.stiffness": 0.0,
     "cable.drag": 0.0,
 }
-"""A drive without any of its imperfections."""
+"""Flat keys and values of a drive without any imperfection."""
 
 
 def as_built(form: AsBuilt) -> Model:
     """Return the equations of the stage with its drive.
 
-    Over a sample the factors of friction, the ripple of the motor and the acceleration of the floor are held.
+    Friction factors, motor ripple and floor acceleration are constant over a sample.
     """
     from dataclasses import replace
 
@@ -109,7 +111,7 @@ def as_built(form: AsBuilt) -> Model:
 def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
     """Return a kink whose levels vary along the rail.
 
-    The side on which a run begins is decided before anything is looked up, by the levels as given.
+    The levels without the rail's factors decide on which side of the kink a run begins.
     """
     from friso.equations.component import Kink, Switch
 
@@ -136,7 +138,10 @@ def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
 
 
 def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
-    """Everything between the encoders and the motor's force; what it sees is added to `loops`."""
+    """Return the controller with everything between the encoders and the motor's force.
+
+    Each loop that is made is added to `loops`.
+    """
     from sympy import pi
 
     from friso.equations.blocks import Controller
@@ -163,10 +168,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return the encoder's reading [m], the controller's command [N], and the numbers it keeps.
-
-    These are kept for the next sample.
-    """
+    """Return the encoder's reading [m], the commanded force [N], and the numbers kept for the next sample."""
     from dataclasses import replace
 
     import sympy as sp

@@ -20,24 +20,24 @@ def bandwidth(flat: Mapping[str, Any]) -> Any:
 
 
 def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
-    """Return stages with their controllers set to bandwidths [Hz], each scaled as a whole.
+    """Return stages whose controllers are scaled to the given bandwidths [Hz].
 
-    For controllers that state no bandwidth, `bandwidth` is a factor on the present one.
+    For a controller that states no bandwidth, `bandwidth` is a factor on its present speed.
     """
     key = controller_of(flat).bandwidth_key
     return faster(flat, bandwidth) if key is None else {**faster(flat, bandwidth / flat[key]), key: bandwidth}
 
 
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with the whole controller faster by a factor, bandwidth included.
+    """Return stages whose whole controller is faster by a factor, bandwidth included.
 
-    All its poles and zeros are scaled.
+    All poles and zeros of the controller are multiplied by the factor.
     """
     return {**flat, **sped_up(flat, factor)}
 
 
 def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return the keys that change in a controller that is faster by a factor, with new values."""
+    """Return the keys that change when a controller becomes faster by a factor, with their new values."""
     controller = controller_of(flat)
     powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
@@ -46,7 +46,7 @@ def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
 def range_example(flat: Mapping[str, Any]) -> str:
     """Return a range of a typical key, as an example in a message.
 
-    It is a range of the bandwidth, of the first gain, or else of a mass.
+    The key is the bandwidth if there is one, else the first gain, else a mass.
     """
     controller = controller_of(flat) if KIND in flat else None
     gains = [controller.bandwidth_key, *map(controller.key, controller.speeds_up)] if controller else []

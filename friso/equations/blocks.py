@@ -43,14 +43,14 @@ class Loop:
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
-    """Return the sign of the first of some rates that is not 0, as 1, -1 or 0."""
+    """Return the sign (1, -1 or 0) of the first of some rates that is not 0."""
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
     return Piecewise(*cases, (sp.S.Zero, True))
 
 
 @dataclass(frozen=True)
 class Controller:
-    """Actuator force [N], its component, and the numbers that it holds between samples."""
+    """A controller: its force [N], its component of the model, and its numbers held between samples."""
 
     force: sp.Expr
     component: Component
@@ -159,32 +159,35 @@ class Blocks(ABC):
     def loop(self, name: str) -> Iterator[None]:
         """Mark the blocks made within as parts of the "position" or the "velocity" loop.
 
-        A drive may carry out that loop more slowly.
+        A drive may run the position loop at a lower rate.
         """
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
-        """Pass a signal to a faster loop: it is held there until it is due again."""
+        """Pass a signal to a faster loop, which holds the value until the slower loop runs again."""
         return signal
 
     def key(self, name: str) -> sp.Symbol:
-        """Return the parameter with this name in the table [controller] [SI]."""
+        """Return the parameter called `name` of the table [controller], in SI units."""
         return key(ControllerSection.key(name))
 
     @property
     def settings(self) -> FrictionSettings:
-        """Return which settings against friction there are."""
+        """Return the settings against friction that the controller has."""
         return self.form.settings if self.form else FrictionSettings()
 
     @abstractmethod
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
-        """1/(1 + tau s), tau [s]; a drive takes it by a `rule`, None: by its own."""
+        """Return a signal behind the low-pass 1/(1 + tau s), tau [s].
+
+        A drive discretises the low-pass by `rule`; None stands for the drive's own rule.
+        """
 
     @abstractmethod
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """Return s/(1 + tau s) of a signal, tau [s].
+        """Return the derivative of a signal, filtered as s/(1 + tau s) with tau [s].
 
-        Without `tau` it is the rate of what is measured, which a drive takes over samples.
+        Without `tau` it is the rate of the measured quantity; a drive takes differences over samples.
         """
 
     @abstractmethod
@@ -200,7 +203,7 @@ class Blocks(ABC):
         """Return gain/s, or gain/(s + leak), of a signal.
 
         The gain is positive, and the controller's force rises with the output. At the force limit the integrator
-        follows the anti-windup; where its own output is at a `limit`, it rests. A drive integrates by the `rule`,
+        follows the anti-windup. An integrator whose own output reaches `limit` stops. A drive integrates by `rule`,
         unless it has a rule of its own.
         """
 
@@ -208,9 +211,9 @@ class Blocks(ABC):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a transfer function of second order, such as a notch.
+        """Return a signal behind a second-order transfer function, such as a notch.
 
-        Its lower polynomial begins with 1.
+        The lowest coefficient of the denominator (`lower`) is 1.
         """
 
     @abstractmethod
@@ -219,33 +222,33 @@ class Blocks(ABC):
 
     @abstractmethod
     def dead_zone(self, error: Signal) -> Signal:
-        """Return the error less the deadband, 0 within that."""
+        """Return the error reduced by the deadband; it is 0 within the deadband."""
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains of standstill where the error is small.
+        """Return the force with the standstill gains where the error is small.
 
-        The force held by integrals stays.
+        The integrals keep the force that they had.
         """
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return a force towards the reference, where that rests and the error is not small."""
+        """Return a constant force towards the reference, while the reference rests and the error is not small."""
 
     @abstractmethod
     def dither(self) -> Signal:
-        """Return a sinusoidal force."""
+        """Return a sinusoidal dither force."""
 
     def fed_back(self, signal: Signal) -> Signal:
-        """Return a signal that is measured, behind the filters of the feedback path."""
+        """Return a measured signal behind the filters of the feedback path."""
         return self._filtered(signal, FEEDBACK)
 
     def fed_forward(self, signal: Signal) -> Signal:
-        """Return the force that is demanded, behind the filters of the forward path."""
+        """Return a demanded force behind the filters of the forward path."""
         return self._filtered(signal, FORWARD)
 
     def _filtered(self, signal: Signal, path: str) -> Signal:
-        """Return a signal behind the filters of a path, in their order."""
+        """Return a signal behind the filters of a path, in the order of the stage file."""
         for number, part in enumerate(self.form.filters if self.form else (), start=1):
             if part.path == path:
                 row = _Row(f"{FILTERS_KEY}.{number}")
@@ -256,19 +259,25 @@ class Blocks(ABC):
     def transfer(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a transfer function of first or second order; its lower polynomial begins with 1."""
+        """Return a signal behind a first- or second-order transfer function.
+
+        The lowest coefficient of the denominator (`lower`) is 1.
+        """
         if lower[2] != 0:
             return self.biquad(signal, upper, lower, name, rule)
         through = sp.sympify(upper[1]) / lower[1]
         return self.low_pass(signal, lower[1], name, rule) * (upper[0] - through) + signal * through
 
     def lead(self, signal: Signal, zero: sp.Expr, pole: sp.Expr, name: str) -> Signal:
-        """(1 + zero s)/(1 + pole s), both [s]: a lead where the zero is the longer one, else a lag."""
+        """Return a signal behind (1 + zero s)/(1 + pole s), both times in [s].
+
+        It is a lead where `zero` exceeds `pole`, else a lag.
+        """
         return signal + self.derivative(signal, name, pole) * (zero - pole)
 
 
 class _Row(dict[str, sp.Symbol]):
-    """The keys of a table in an array, as parameters."""
+    """The keys of one row in an array of tables, as parameters."""
 
     def __init__(self, place: str) -> None:
         super().__init__()
@@ -282,8 +291,8 @@ class _Row(dict[str, sp.Symbol]):
 class Demand:
     """The force that a controller demands.
 
-    `shares` are its parts by name, `total` is their sum, `force` [N] adds settings against friction and filters, and
-    `error` [m] is measured.
+    `shares` are its terms by name, and `total` is their sum. `force` [N] is the total after filters and settings
+    against friction. `error` [m] is the measured error.
     """
 
     shares: Mapping[str, Signal]
@@ -319,15 +328,15 @@ def force_limit() -> sp.Symbol:
 
 
 def unwinding_time() -> sp.Symbol:
-    """Return the time [s] in which back-calculation unwinds an integrator."""
+    """Return the time constant [s] with which back-calculation unwinds an integrator."""
     return key(ANTI_WINDUP_TIME)
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the integrals in a steady motion, so that the force is that of `STEADY`.
+    """Return the integrals in a steady motion for which the force equals that of `STEADY`.
 
-    The innermost integral, which is made last, supplies that force; the others are 0. `force` is the controller's own
-    in that motion, in terms of the integrals.
+    The innermost integral, which is made last, supplies the force; the others are 0. `force` is the controller's own
+    force in the steady motion, in terms of the integrals.
     """
     if not integrals:
         return {}

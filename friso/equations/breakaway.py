@@ -1,4 +1,4 @@
-"""Forces at which guide and motor break away and slide, by what their friction laws declare."""
+"""Compute the forces at which guide and motor break away and slide, from their friction laws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
 SLOW = 1e-12
-"""Speed [m/s] at which a law slides that hardly moves."""
+"""Speed [m/s] that stands for the slowest possible sliding."""
 
 Force = Callable[[Mapping[str, Any]], Any]
 
@@ -40,7 +40,7 @@ def sliding(flat: Mapping[str, Any]) -> Any:
 def least_breakaway(flat: Mapping[str, Any]) -> Any:
     """Return the force [N] at which the guide breaks away in its weaker direction.
 
-    A bias force on the cart is subtracted. Laws declare the mean break-away force of both directions.
+    Laws declare the mean break-away force of both directions. A bias force on the cart is subtracted.
     """
     forward, back = _slow(flat)
     total = forward + back
@@ -49,7 +49,7 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the keys as the laws of guide and motor know them."""
+    """Return the flat keys once as the guide's friction law and once as the motor's sees them."""
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]
 
@@ -68,7 +68,7 @@ def _breakaway(flat: Mapping[str, Any]) -> Any:
 def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     """Return the forces [N] of one law against the slowest motion, forward and back.
 
-    They are 0 if the law cannot say them.
+    They are 0 if the law declares no steady friction.
     """
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:

@@ -1,8 +1,8 @@
-"""Expressions by cases, taken as they are written.
+"""Piecewise expressions that keep their conditions as written.
 
-SymPy's own class simplifies conditions in which other cases occur, whenever one is made or changed. In the equations of
-a sampled controller with settings against friction, whose conditions depend on each other, that takes minutes and
-leaves nothing shorter.
+SymPy's own class simplifies conditions in which other piecewise expressions occur, whenever one is made or changed.
+Conditions of a sampled controller with settings against friction depend on each other. For those, SymPy takes minutes
+and finds nothing shorter.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ from sympy.functions.elementary.piecewise import ExprCondPair
 
 
 class _Case(ExprCondPair):
-    """An expression and its condition, which is kept as it is."""
+    """An expression and its condition, kept as written."""
 
     def __new__(cls, expression: Any, condition: Any) -> _Case:
         return sp.Tuple.__new__(cls, sp.sympify(expression), sp.sympify(condition))
 
 
 class Piecewise(sp.Piecewise):
-    """The first of some expressions whose condition holds: ``Piecewise((1, x > 0), (-1, x < 0), (0, True))``.
+    """The first of some expressions whose condition holds.
 
-    Conditions that never hold, what follows one that always does, and cases before that with the same expression (such
-    as a derivative has) are left out. Raises TypeError where no condition may hold.
+    An example is ``Piecewise((1, x > 0), (-1, x < 0), (0, True))``. Cases whose condition is never true are left out,
+    and so is everything after a condition that is always true. Cases before that one with the same expression, as a
+    derivative may have, are left out too. Raises TypeError where no condition can be true.
     """
 
     def __new__(cls, *cases: Any, **options: Any) -> Any:

@@ -31,7 +31,7 @@ TIME = sp.Symbol("time", real=True)
 
 
 STEADY = Steady(*(sp.Symbol(f"steady_{name}", real=True) for name in Steady._fields))
-"""The steady motion that a run begins with."""
+"""Symbols of the steady motion with which a run begins."""
 
 
 @dataclass(frozen=True)
@@ -66,16 +66,16 @@ class Held:
 
 
 TICK = sp.Symbol("tick", real=True)
-"""Number of the sample that a clock takes, from 0."""
+"""Index of a sample, counted from 0."""
 
 
 @dataclass(frozen=True)
 class Clock:
     """The instants at which a drive samples: every `period` [s].
 
-    What it computes at a sample acts `late` [s] after it, less than a period; then the numbers that are held change.
-    `seen` are the states measured at the sample itself, under names of their own. `places` are looked up in tables
-    over the position that a state holds, `times` in tables over the time of the sample; both are held too.
+    Results of a sample take effect `late` [s] after it, less than a period; then the held numbers change. `seen` are
+    states measured at the sample itself, under separate names. `places` are tables looked up by the position in a
+    state, and `times` are tables looked up by the time of the sample. Looked-up values are held between samples too.
     """
 
     period: sp.Expr
@@ -86,14 +86,14 @@ class Clock:
 
     @property
     def tabled(self) -> tuple[sp.Symbol, ...]:
-        """Return all that is looked up."""
+        """Return the symbols of all values that are looked up in tables."""
         return (*self.places, *self.times)
 
 
 class gaussian(sp.Function):
-    """A normally distributed number for a seed and the number of a sample.
+    """A normally distributed number, determined by a seed and the index of a sample.
 
-    It is the same in every lane and thread (`friso.engine`).
+    It does not depend on lane or thread (`friso.engine`).
     """
 
     nargs = 2
@@ -105,7 +105,7 @@ class sine(sp.Function):
     nargs = 1
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """2 pi cos(2 pi x)."""
+        """Return the derivative, 2 pi cos(2 pi x)."""
         return 2 * sp.pi * sine(self.args[0] + sp.Rational(1, 4))
 
 
@@ -128,10 +128,10 @@ class quantised(sp.Function):
 class Kink:
     """A surface in state space on which a derivative of the right-hand side jumps.
 
-    `beyond` is the symbol that is 1 where `surface` > 0 and 0 where it is < 0; the right-hand side contains
-    it instead of an absolute value or a condition, and so is smooth while it is held. Within about `narrow` of the
-    surface, in its own unit, the right-hand side may have a peak that a long step across the surface would pass over.
-    Where the surface contains the sides of other kinks, it `starts` as that, with conditions in their place.
+    `beyond` is a symbol that is 1 where `surface` > 0, and 0 where `surface` < 0. The right-hand side contains it
+    instead of an absolute value or a condition, and so is smooth while `beyond` is held. Within about `narrow` of the
+    surface (in the unit of `surface`) the right-hand side may have a peak, which a long step across would miss.
+    `starts` is the surface with conditions in place of the `beyond` symbols of other kinks.
     """
 
     name: str
@@ -145,20 +145,23 @@ class Kink:
 
     @property
     def sign(self) -> sp.Expr:
-        """+1 beyond the surface, -1 before it."""
+        """Return +1 beyond the surface, -1 before it."""
         return 2 * self.beyond - 1
 
     @property
     def at_start(self) -> sp.Expr:
-        """Positive in the states from which a run begins beyond."""
+        """Return an expression that is positive in states where a run begins beyond the surface."""
         return self.surface if self.starts is None else self.starts
 
     def beginning(self, sides: Mapping[Any, Any]) -> Kink:
-        """Return the kink with conditions for the sides of other kinks at the start of a run."""
+        """Return the kink with conditions in place of other kinks' sides, for the start of a run."""
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
-        """Return the kink with another name; replace `beyond` in expressions that contain it."""
+        """Return the kink under another name.
+
+        Expressions that contain the old `beyond` must be given the new one.
+        """
         return replace(self, name=name)
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
@@ -170,11 +173,12 @@ class Kink:
 
 @dataclass(frozen=True)
 class Switch(Kink):
-    """A mode with memory, such as slipping: its side depends on how the motion came there.
+    """A mode with memory, such as slipping: the history of the motion decides its side.
 
-    It is entered where `enter` rises through 0 and left where `leave` does; `beyond` is 1 in it. `begins` is positive
-    in the states in which a run begins in the mode if nothing else decides; it contains no mode. `entered` and `left`
-    are new values of states on entering and on leaving, in terms of the old ones; other states are unchanged.
+    The mode is entered where `enter` rises through 0, and left where `leave` does. `beyond` is 1 in the mode. `begins`
+    is positive in states where a run begins in the mode, if nothing else decides; it contains no mode. `entered` and
+    `left` are the new values of states on entering and on leaving, in terms of the old ones. Other states do not
+    change.
     """
 
     surface: sp.Expr = field(init=False, compare=False)
@@ -193,7 +197,7 @@ class Switch(Kink):
 
     @property
     def becomes(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return the new values of states where the mode changes; `beyond` is its old value."""
+        """Return the new values of states at a change of the mode, in terms of the old `beyond`."""
         changed = dict.fromkeys((*self.entered, *self.left))
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 
@@ -211,7 +215,7 @@ class Switch(Kink):
 
 @dataclass(frozen=True)
 class Output:
-    """A quantity to show: an expression in states, time and parameters, its unit and its name."""
+    """A quantity to be plotted or listed: its expression, unit and name."""
 
     expression: sp.Expr
     unit: str
@@ -220,7 +224,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Component:
-    """A part of the model: what it adds to the states, kinks and outputs."""
+    """A part of the model, with its states, kinks and outputs."""
 
     states: tuple[State, ...] = ()
     kinks: tuple[Kink, ...] = ()

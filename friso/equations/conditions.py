@@ -1,8 +1,9 @@
-"""The conditions under which a machine runs: what multiplies static and Coulomb friction of its guide, for every law.
+"""Operating conditions of a machine, which multiply static and Coulomb friction of its guide for every law.
 
-Friction grows with the normal force beside a part of its own (seals, preload), and is larger in the cold: Carvalho
-Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A machine that runs gets warm exponentially in time: Simoni,
-Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. Along a rail it varies as `friso.equations.rail` has it.
+Friction consists of a constant part (seals, preload) and a part that grows with the normal force. It is larger in the
+cold: Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A running machine warms up exponentially in time:
+Simoni, Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. For the variation of friction along a rail, see
+`friso.equations.rail`.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ if TYPE_CHECKING:
     import sympy as sp
 
 LEVELS = ("static", "coulomb")
-"""Names of the keys of friction that conditions multiply."""
+"""Names of the friction keys that operating conditions multiply."""
 
 GROWTH = f"{CONDITIONS}.growth"
-"""By what share the factors grow with the acceleration of the reference [s^2/m]."""
+"""Key of the relative growth of the factors per acceleration of the reference [s^2/m]."""
 
 DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
-"""The numeric keys that decide on whether the load follows the acceleration."""
+"""Numeric keys that decide whether the load follows the acceleration."""
 
 
 def factor_key(level: str) -> str:
@@ -34,7 +35,7 @@ def factor_key(level: str) -> str:
 
 
 def has_conditions(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage given as flat keys states its conditions."""
+    """Tell whether a stage given as flat keys has a table [conditions]."""
     return factor_key("static") in flat
 
 
@@ -44,9 +45,9 @@ def load_follows(flat: Mapping[str, Any]) -> bool:
 
 
 def friction_level(name: str, conditions: bool) -> sp.Expr:
-    """Return static or Coulomb friction [N], with [conditions] if there are any.
+    """Return static or Coulomb friction [N], multiplied by its factor if the stage has [conditions].
 
-    It holds while the reference does not accelerate.
+    It is valid at constant speed of the reference.
     """
     from friso.equations.component import key
 
@@ -60,7 +61,7 @@ def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
 
 
 def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
-    """Return the factors while the reference accelerates [m/s^2], for those at constant speed."""
+    """Return substitutions from the factors at constant speed to those at an acceleration [m/s^2]."""
     from friso.equations.component import key
 
     factors = [key(factor_key(name)) for name in LEVELS]
@@ -69,9 +70,9 @@ def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
 
 @register_derivation(CONDITIONS)
 def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys of the factors that follow from [conditions], numbers or arrays.
+    """Return flat keys of the friction factors that follow from [conditions], numbers or arrays.
 
-    They hold at the stage's place on the rail. Raises InputError for a correlation length that is tiny against the
+    They are valid at the stage's place on the rail. Raises InputError for a correlation length that is tiny against the
     range of places.
     """
     own = {key.removeprefix(f"{CONDITIONS}."): flat[key] for key in flat if key.startswith(f"{CONDITIONS}.")}
@@ -86,9 +87,9 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys for a machine that moves along its rail.
+    """Return the flat keys of a machine that moves along its rail.
 
-    Its friction then has no factor of a single place.
+    Its friction factors omit those of a single place.
     """
     if not has_conditions(flat):
         return dict(flat)
@@ -97,12 +98,12 @@ def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _deviates(flat: Mapping[str, Any]) -> bool:
-    """Tell whether levels deviate at random along the rail."""
+    """Tell whether friction deviates at random along the rail."""
     return any(np.any(flat.get(f"rail.{level}_deviation", 0.0)) for level in LEVELS)
 
 
 def _at_place(flat: Mapping[str, Any], place: Any) -> np.ndarray:
-    """Factors of static and Coulomb friction of the rail at places [m], shape (2,) or (2, n)."""
+    """Return factors of static and Coulomb friction at places [m] on the rail, shape (2,) or (2, n)."""
     from friso.equations.rail import friction_factors
 
     rail = {key: value for key, value in flat.items() if key.startswith("rail.")}

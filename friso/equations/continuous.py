@@ -1,4 +1,4 @@
-"""Controllers in continuous time."""
+"""Realise the blocks of controllers in continuous time."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from friso.stage.filters import FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
 UNWINDING_BAND = sp.Rational(1, 1000)
-"""Share of the force limit over which the integrator is brought to rest.
+"""Width of the band over which an integrator stops at the force limit, as a fraction of the limit.
 
-An integrator that stops dead at the limit makes the right-hand side jump, and the solution slides along the limit
-switching for ever; over this narrow band the stop is continuous and the slide is an ordinary, stiff, motion."""
+An integrator that stopped abruptly would make the right-hand side jump, and the solution would switch endlessly along
+the limit. Within the band the stop is continuous, and the motion along the limit is ordinary, if stiff."""
 
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
@@ -57,9 +57,9 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return proportional [N/m] and integral gain [N/(m s)] for an error that hardly changes.
+    """Return proportional [N/m] and integral gain [N/(m s)] for slow changes of a large error.
 
-    The error lies beyond all windows and deadbands, and the stage's reference rests.
+    The error lies beyond all windows and deadbands, and the reference rests.
     """
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
@@ -81,16 +81,16 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _per_error(value: sp.Expr) -> sp.Expr:
-    """Return the derivative of a value by the error, the stage being displaced the other way."""
+    """Return the derivative of a value with respect to the error, at fixed reference."""
     return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
 
 
 @dataclass(frozen=True)
 class ForceLimit:
-    """A limit of the force [N].
+    """The force limit of a controller.
 
-    It has the force within the limit, its kinks, its difference from the demand [N], and the behaviour of integrators
-    at the limit.
+    It has the limited force [N], its kinks, its difference from the demand [N], and the behaviour of integrators at the
+    limit.
     """
 
     limit: sp.Expr
@@ -109,9 +109,10 @@ class ForceLimit:
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator: its state, its input (also in a steady motion), its magnitude and output.
+    """An integrator.
 
-    It may have a limit of its output, and a rate at which it leaks.
+    It has a state, an input (also in a steady motion), a magnitude and an output. Its output may have a limit, and it
+    may leak at a rate.
     """
 
     symbol: sp.Symbol
@@ -124,9 +125,9 @@ class _Integral:
 
 
 class Continuous(Blocks):
-    """Blocks of a controller in continuous time, whose memories are states.
+    """Blocks of a controller in continuous time: every memory is a state.
 
-    `rate` [1/s] is the natural frequency of the motion, by which states are scaled.
+    `rate` [1/s] is the natural frequency of the motion, which scales the states.
     """
 
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
@@ -143,14 +144,14 @@ class Continuous(Blocks):
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
-        """By a state, the filtered signal; `tau` [s]."""
+        """Return the low-passed signal, which is a state; `tau` [s]."""
         low = state(f"filtered_{name}")
         slope = (signal.value - low) / tau
         self.states.append(State(low, slope, "m", signal.scale, Role.FILTER, signal.settled))
         return replace(signal, value=low, rate=slope)
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """With a filter by the state of that; `tau` [s]."""
+        """Return the derivative of a signal; its filter, if any, has one state; `tau` [s]."""
         slope = signal.rate if tau is None else self.low_pass(signal, tau, name).rate
         if slope is None:
             raise ValueError(f"the derivative of {name} needs a filter")
@@ -165,7 +166,10 @@ class Continuous(Blocks):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """By a state, which rests as the base class describes; `gain` in N per unit of the state."""
+        """Return the integral of a signal, which is a state; `gain` in N per unit of the state.
+
+        It stops at limits as described in the base class.
+        """
         symbol = state(name)
         output = gain * symbol
         scale = signal.scale / self.rate
@@ -175,7 +179,10 @@ class Continuous(Blocks):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """By two states: the signal through the lower polynomial, and its rate."""
+        """Return a signal behind a second-order filter with two states.
+
+        They are the signal divided by the denominator, and its rate.
+        """
         low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
         bend = (signal.value - low - lower[1] * slope) / lower[2]
         self.states += [
@@ -190,13 +197,13 @@ class Continuous(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, rate=changes)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """With a kink at either limit."""
+        """Return the limited signal, with one kink at each limit."""
         value, kinks = _clamped(signal.value, limit, name)
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
 
     def dead_zone(self, error: Signal) -> Signal:
-        """With a kink where the error is as large as the deadband."""
+        """Return the error less the deadband, with a kink at each end of the deadband."""
         band = self.key("error_deadband")
         inside = Kink("error_deadband", band**2 - error.value**2)
         self.kinks.append(inside)
@@ -209,7 +216,7 @@ class Continuous(Blocks):
         return replace(error, value=value, settled=settled, rate=rate)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """With a kink where the error is as large as the window."""
+        """Return the force with the standstill gains, with a kink at each end of the window."""
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))
         inside = Kink("standstill", window**2 - error.value**2)
         self.kinks.append(inside)
@@ -224,7 +231,7 @@ class Continuous(Blocks):
         return replace(total, value=value, settled=resting, rate=None)
 
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """With a kink at either end of the window."""
+        """Return the pushing force, with a kink at each end of the window."""
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
@@ -233,12 +240,12 @@ class Continuous(Blocks):
         return Signal(resting * (ahead.beyond - behind.beyond), push, push * side, sp.S.Zero)
 
     def dither(self) -> Signal:
-        """Over the time since the last corner of the reference."""
+        """Return the dither force over the time since the last corner of the reference."""
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         return Signal(amplitude * sine(frequency * TIME), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _pausing(self, error: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
-        """Return the share by which integrals go on beside the deadband [0 or 1], and its kink."""
+        """Return a factor that is 0 where integrals pause and 1 elsewhere, and its kinks."""
         if not self.settings.deadband:
             return sp.S.One, ()
         within = self.key("integral_deadband") ** 2 - error**2
@@ -248,15 +255,15 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """Return the mode in which the error is positive, at whose ends integrals begin anew."""
+        """Return a mode for the sign of the error; integrals restart where the mode changes."""
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
-        """Return all states and the kinks, with the integrators' behaviour at limits.
+        """Return all states and kinks, with the integrators' behaviour at limits.
 
-        Integrators follow the anti-windup where the demand exceeds its bound. They rest where their output exceeds a
-        limit of its own.
+        Integrators follow the anti-windup where the demand exceeds its bound. Integrators stop where their own output
+        reaches a limit.
         """
         steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
@@ -308,16 +315,16 @@ def _clamped(value: sp.Expr, limit: sp.Expr, name: str) -> tuple[sp.Expr, tuple[
 
 
 def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...]:
-    """Return the kinks where an integrator has come to rest: a band beyond the limits."""
+    """Return the kinks beyond which an integrator has stopped, a narrow band outside the limits."""
     upper, lower = limits
     band = UNWINDING_BAND * limit
     return Kink(f"{name}_upper", upper.surface - band), Kink(f"{name}_lower", lower.surface - band)
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return the share by which an integrator rests because of a limit, 0 to 1.
+    """Return how far an integrator is stopped by a limit: 0 runs, 1 is stopped.
 
-    It rests while the value is beyond its limit and would be driven further.
+    It stops where the value is beyond its limit and would be driven further.
     """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):

@@ -1,7 +1,8 @@
-"""The friction law of a stage on a body that is dragged along a measured motion, sample by sample: nothing acts back.
+"""Equations of a friction law on a body that follows a measured motion, sample by sample.
 
-Beside the law's own states the impulse of the friction force is integrated: its differences are the mean forces from
-sample to sample, whatever the law."""
+The friction force does not act back on the motion. The impulse of the friction force is integrated as well. Its
+differences give the mean force between samples, for any law.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +17,12 @@ if TYPE_CHECKING:
     from friso.equations.model import Model
 
 IMPULSE = "impulse"
-"""State that grows by the friction force [N s]."""
+"""Name of the state that integrates the friction force [N s]."""
 
 
 @dataclass(frozen=True)
 class Dragged(Imposed):
-    """The friction law of a body that follows a reference, and what its equations depend on."""
+    """A friction law on a body that follows a reference, and the variant of its equations."""
 
 
 def dragged(form: Dragged) -> Model:

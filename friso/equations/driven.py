@@ -1,4 +1,4 @@
-"""A stage that follows a log: its reference, and a force besides the controller's, come sample by sample."""
+"""Equations of a stage that follows a log: reference and external force are given sample by sample."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from friso.equations.model import Control, Model
 
 HELD_FORCE = "held_force"
-"""The number in which a drive with a clock keeps its force [N] until the next sample."""
+"""Name of the force [N] that a sampled drive holds until the next sample."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Driven:
 
 
 def driven(form: Driven) -> Model:
-    """Return the equations of a stage whose reference and force are given at every sample.
+    """Return the equations of a stage whose reference and external force are given at every sample.
 
-    Given are position [m], velocity [m/s] and acceleration [m/s^2] of the reference, and the force [N] beside the
-    controller's with its rate [N/s].
+    The reference has position [m], velocity [m/s] and acceleration [m/s^2]. The external force [N] acts in addition to
+    the controller's, and has a rate [N/s].
     """
     from dataclasses import replace
 
@@ -47,7 +47,7 @@ def driven(form: Driven) -> Model:
 
 
 def _sampled(form: Driven) -> Control:
-    """Return the controller as a drive carries it out, sampling at the reference's corners."""
+    """Return the controller as a drive computes it, sampling at the corners of the reference."""
     from dataclasses import replace
 
     from friso.equations.blocks import Controller, Loop

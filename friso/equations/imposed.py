@@ -1,7 +1,7 @@
-"""The friction law of a stage on a body whose motion is imposed as a sinusoid, for its describing function.
+"""Equations of a friction law under an imposed sinusoidal motion, for its describing function.
 
-Time counts in periods, so that every run lasts the same. The first harmonic of the friction force is integrated beside
-it: to the solver's tolerance, however thin the layers are in which the force changes.
+Time counts in periods, so that all runs have equal length. The first harmonic of the friction force is integrated as
+well, to the solver's tolerance, however abruptly the force changes.
 """
 
 from __future__ import annotations
@@ -21,23 +21,26 @@ if TYPE_CHECKING:
     from friso.equations.model import Model
 
 FREQUENCY = "imposed.frequency"
-"""Key of the frequency of the motion [Hz]; its amplitude is the displacement from which it starts."""
+"""Key of the frequency of the motion [Hz].
+
+Its amplitude is the displacement at the start."""
 
 HARMONIC = ("in_phase", "in_quadrature")
-"""States that grow over a period by the real and the imaginary part of the first harmonic of the friction force [N]
-(of force = Re(harmonic exp(2 pi i time)), position = amplitude cos(2 pi time))."""
+"""States that integrate the real and the imaginary part of the first harmonic of friction [N] over a period.
+
+With the harmonic, force = Re(harmonic exp(2 pi i time)) and position = amplitude cos(2 pi time)."""
 
 
 @dataclass(frozen=True)
 class Imposed:
-    """Friction law on a body with an imposed motion, and its variant (see `Structure`)."""
+    """A friction law on a body with an imposed motion, and its variant (see `Structure`)."""
 
     friction: str
     friction_variant: Hashable
 
 
 def imposed_form(flat: Mapping[str, Any]) -> Imposed:
-    """Return the law of a stage given as flat mapping. Raises InputError where it has no force."""
+    """Return the law of a stage given as flat keys. Raises InputError for a law without a force."""
     name = flat["friction.model"]
     law = friction_law(name)
     if law.declare is FrictionSection.declare:
@@ -83,7 +86,7 @@ def imposed(form: Imposed) -> Model:
 def _per_period(inner: State, period: sp.Expr) -> State:
     """Return a state of the law with its rate per period.
 
-    A state that is a length is scaled by the motion.
+    States that are lengths are scaled by the motion.
     """
     import sympy as sp
 

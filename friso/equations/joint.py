@@ -1,7 +1,7 @@
 """The compliant joint between cart and stage, with its stroke limiter in parallel when touched (thesis, Fig. 3).
 
-Table 1 of the thesis prints a series formula for the touched limiter; a limiter that touches carries its force
-beside the leaf springs, so stiffness and damping add up here.
+Table 1 of the thesis prints a series formula for the touched limiter. A touching limiter acts in parallel with the leaf
+springs, so stiffness and damping are added here.
 """
 
 from __future__ import annotations

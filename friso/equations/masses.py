@@ -23,7 +23,7 @@ class Body:
         return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
 
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
-        """Newton's second law for the sum of forces [N]."""
+        """Return the states of the body under the sum of forces [N], by Newton's second law."""
         return (
             State(self.position, self.velocity, "m", length, Role.POSITION, STEADY.position),
             State(self.velocity, force / self.mass, "m/s", length * rate, Role.VELOCITY, STEADY.velocity),
@@ -43,7 +43,7 @@ def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
 
 
 def position_outputs(prefix: str, name: str, body: Body) -> Component:
-    """Position and velocity of a body as outputs."""
+    """Return position and velocity of a body as outputs."""
     return Component(
         outputs={
             f"{prefix}position": Output(body.position, "m", f"{name} position"),
@@ -53,9 +53,9 @@ def position_outputs(prefix: str, name: str, body: Body) -> Component:
 
 
 def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
-    """Return the kinks at which two bodies touch, ahead and behind.
+    """Return the two kinks, ahead and behind, at which bodies touch.
 
-    They may move against each other by a reach [m] to either side.
+    They have a clearance `reach` [m] to either side.
     """
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
 
@@ -63,7 +63,7 @@ def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
 def beyond_stops(ahead: sp.Expr, behind: sp.Expr, contact: sp.Expr, reached: sp.Expr) -> sp.Expr:
     """Return the force [N] between two bodies at stops; zero between the stops.
 
-    `ahead` and `behind` are 1 where that stop acts, else 0. The force is what `contact` would exert [N] if it always
-    touched, less what it has `reached` at the stops [N].
+    `ahead` and `behind` are 1 where the respective stop acts, else 0. `contact` is the force [N] of a permanent
+    contact, and `reached` its value [N] at the stops, which is subtracted.
     """
     return (ahead + behind) * contact + (behind - ahead) * reached

@@ -25,14 +25,14 @@ from friso.stage.tables import friction_law
 from friso.stage.transmission import MOTOR_MASS
 
 REFERENCE = declared().inputs
-"""Position, velocity and acceleration of a reference in pieces of parabola at its last corner."""
+"""Position, velocity and acceleration of a reference at its last corner."""
 
 MOTION_SIZE = key("motion.size")
 """Length of the motion [m]; 0 where the reference stands still."""
 
 
 SMALLEST_LENGTH = sp.Rational(1, 10**4)
-"""Share of the motion below which its length scale does not fall, however little friction there is."""
+"""Lower bound of the length scale, as a fraction of the motion, for stages with little friction."""
 
 
 @dataclass(frozen=True)
@@ -82,17 +82,17 @@ class Model:
 
     @property
     def settled(self) -> tuple[sp.Expr, ...]:
-        """States, then the numbers held, in a steady motion that has lasted, in terms of `STEADY`."""
+        """Return states and held numbers in a steady motion that has lasted, in terms of `STEADY`."""
         return tuple(part.settled for part in (*self.states, *self.held))
 
     @property
     def switches(self) -> tuple[Switch, ...]:
-        """Return the modes that remember."""
+        """Return the modes with memory."""
         return tuple(kink for kink in self.kinks if isinstance(kink, Switch))
 
     @property
     def discrete(self) -> tuple[sp.Symbol, ...]:
-        """Return the symbols of a run besides its states: numbers held, and the modes that remember."""
+        """Return the symbols of a run besides its states: held numbers and modes with memory."""
         return (*(held.symbol for held in self.held), *(switch.beyond for switch in self.switches))
 
     @property
@@ -115,17 +115,17 @@ class Model:
 
 
 def resets(kinks: Iterable[Kink]) -> dict[Kink, dict[sp.Symbol, sp.Expr]]:
-    """Return by how much states jump where a mode that remembers changes (see `Model.jumps`)."""
+    """Return the jumps of states where a mode with memory changes (see `Model.jumps`)."""
     switches = (kink for kink in kinks if isinstance(kink, Switch))
     return {switch: {x: new - x for x, new in becomes.items()} for switch in switches if (becomes := switch.becomes)}
 
 
 Control = Callable[[Loop, sp.Expr, sp.Expr], Controller]
-"""Makes a controller from what it sees, and the scales of its states: a length [m] and a rate [1/s]."""
+"""Function that makes a controller from its inputs and the scales of its states: a length [m] and a rate [1/s]."""
 
 
 External = Callable[[Body], sp.Expr]
-"""A force [N] on the stage, which may depend on its motion."""
+"""Function that gives an external force [N] on the stage, which may depend on its motion."""
 
 
 def assemble(structure: Structure, external: External | None = None, control: Control | None = None) -> Model:
@@ -189,7 +189,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
 
 
 def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
-    """Proportional stiffness of the loop [N/m]; 0 without a controller."""
+    """Return the proportional stiffness of the loop [N/m]; 0 without a controller."""
     return form.section.stiffness(Continuous(sp.S.One), form.variant) if form else sp.S.Zero
 
 
@@ -204,13 +204,13 @@ class Bodies:
 
     @property
     def mass(self) -> sp.Expr:
-        """Return all that moves [kg]."""
+        """Return the whole moving mass [kg]."""
         mass = self.cart.mass + (self.stage.mass if self.stage is not self.cart else 0)
         mass += self.parasitic.mass if self.parasitic else 0
         return mass + (self.motor.mass if self.motor else 0)
 
     def measured(self, structure: Structure) -> tuple[Body, Body]:
-        """Return the bodies whose position and whose velocity the controller acts on."""
+        """Return the two bodies whose position and whose velocity the controller measures."""
         form = structure.transmission
         sides = (form.position, form.velocity) if form else ("load", "load")
         on_position, on_velocity = (self.motor if side == "motor" and self.motor else self.stage for side in sides)
@@ -219,7 +219,7 @@ class Bodies:
 
 @dataclass(frozen=True)
 class Pushes:
-    """Pushes [N] of the actuator, and from outside on the stage."""
+    """The forces [N] of the actuator, and of external causes on the stage."""
 
     actuator: sp.Expr
     external: sp.Expr
@@ -244,7 +244,7 @@ def _bodies(structure: Structure) -> Bodies:
 def _positions(structure: Structure, chain: Bodies) -> list[Component]:
     """Return position and velocity of the stage as outputs.
 
-    With a transmission the measured side comes first, then the other.
+    With a transmission, the outputs of the measured side come first.
     """
     if not (structure.transmission and chain.motor):
         return [position_outputs("", "stage", chain.stage)]
@@ -255,7 +255,7 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
-    """Return the friction law at the motor."""
+    """Return the friction law at the motor, if there is one."""
     form = structure.transmission
     if form is None or chain.motor is None:
         return None
@@ -265,18 +265,18 @@ def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
 
 
 def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
-    """Return the largest force [N] with which the controller may pull while nothing moves.
+    """Return the largest force [N] of the controller at which nothing moves.
 
-    It is the sum of friction forces at rest and the controller's force half a backlash off its reference.
+    It is the sum of friction forces at rest, and of the controller's force at an error of half the backlash.
     """
     force = sum((friction.breakaway for friction in frictions if friction), start=sp.S.Zero)
     return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
 
 
 def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
-    """Return friction [N] at guide and motor while all masses move as the cart does.
+    """Return friction [N] at guide and motor while all masses move with the cart.
 
-    None if a law cannot say it.
+    It is None if a law does not determine it.
     """
     total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
     if motor_friction and chain.motor and total is not None:

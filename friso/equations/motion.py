@@ -1,4 +1,4 @@
-"""What other rooms ask of a stage's motion: pieces of its reference, where that stands, its size, where runs begin."""
+"""Provide what other modules need of a stage's motion: pieces of its reference, places of standstill, size, start."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     """Return the pieces of one run with sinusoids, cut where the reference reverses.
 
-    Sinusoids are given as at time 0.
+    The phases of the sinusoids are given at time 0.
     """
     starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
@@ -59,7 +59,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     bare[:, first:] = 0.0
 
     def rate(time: np.ndarray) -> np.ndarray:
-        """Velocity of the reference at times of the run [m/s]."""
+        """Return the velocity of the reference at times of the run [m/s]."""
         piece = bare[np.searchsorted(starts, time, side="right") - 1]
         of_tones = np.concatenate([np.zeros((1, first)), rows[:1, first:]], axis=1)
         return value(form, piece, time - piece[:, 0], 1) + value(form, of_tones, time, 1)
@@ -83,62 +83,62 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
 
 
 def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Reference position [m] at the times [s], of one run."""
+    """Return the reference position [m] of one run at the times [s]."""
     rows = pieces(flat, 1)[0]
     row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
     return value(form_of(flat), row, time - row[:, 0])
 
 
 def size(flat: Mapping[str, Any]) -> Any:
-    """Length of the motion [m]; 0 where the reference stands still from the start."""
+    """Return the length of the motion [m]; 0 where the reference never moves."""
     return motion_of(flat).motion_size(flat)
 
 
 def initial_displacement(flat: Mapping[str, Any]) -> Any:
-    """Position of all masses at the start [m]."""
+    """Return the position of all masses at the start [m]."""
     return motion_of(flat).initial_displacement(flat)
 
 
 def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
-    """Return the places where the reference comes to stand, in turn.
+    """Return the places where the reference stands still, in order of time.
 
-    For a reference that never stands it is from its last corner on.
+    A reference that never stands has one, from its last corner on.
     """
     return motion_of(flat).stands(flat)
 
 
 def rests(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference stands in the end, so that a stage may hunt about a place."""
+    """Tell whether the reference stands still in the end, so that a stage can hunt."""
     return motion_of(flat).rests or _ends_without(1, flat)
 
 
 def ends_evenly(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference stands in the end, or moves on at constant velocity."""
+    """Tell whether the reference ends at rest or at constant velocity."""
     return _ends_without(2, flat)
 
 
 def _ends_without(derivative: int, flat: Mapping[str, Any]) -> bool:
-    """Tell whether this derivative of the reference, and all higher ones, are zero in the end, for all stages."""
+    """Tell whether this derivative of the reference and all higher ones end at zero, for all stages."""
     rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
     return bool(np.all(at_rest(form_of(flat), rows[:, -1], derivative)))
 
 
 def returns(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the references of some stages come to stand where they began."""
+    """Tell whether the reference of any stage stops where it began."""
     return motion_of(flat).rests and not np.any(motion_of(flat).pieces(flat)[-1][1])
 
 
 def last_corner(flat: Mapping[str, Any]) -> Any:
-    """Time of the last corner of the reference [s]: from then on it stays as it is."""
+    """Return the time of the last corner of the reference [s]; from there on one formula describes it."""
     return motion_of(flat).pieces(flat)[-1][0]
 
 
 def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np.ndarray:
-    """Return the time [s], shape (runs,), from which the last part of runs is looked at.
+    """Return the time [s], shape (runs,), at which the last part of each run begins.
 
-    Runs end at `ended` [s], shape (runs,); the last part begins after a `share` of a run, say 0.75. Where the last
-    `corner` [s] of the reference lies late, it begins after share - 0.25 of the time that follows the corner: a stage
-    has a quarter of that time at least to settle where the share is 0.5 or more.
+    Runs end at `ended` [s], shape (runs,). The last part begins after the fraction `share` of a run, such as 0.75. If
+    the last `corner` [s] of the reference is late, it begins after the fraction share - 0.25 of the time since the
+    corner, so that a stage has at least a quarter of that time to settle where the share is 0.5 or more.
     """
     late = np.where(corner < ended, corner, 0.0)
     return np.maximum(share * ended, late + (share - 0.25) * (ended - late))

@@ -1,4 +1,4 @@
-"""The bearing along its rail: by what it multiplies static and Coulomb friction at each place."""
+"""Factors by which the bearing's static and Coulomb friction vary along its rail."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from scipy.special import ndtri
 from friso.errors import InputError
 
 PHASES, FIELD = int.from_bytes(b"phases"), int.from_bytes(b"field")
-"""Which of a seed's random numbers: Philox takes them as the second half of its key."""
+"""Second halves of the Philox key, one for the random phases and one for the random field of a seed."""
 
 HARMONICS = ("first", "second", "third")
 
 CELLS, REACH = 2, 5
-"""Cells of white noise per correlation length, and the lengths after which the kernel over them ends. The sum over the
-cells is then wrong by 2 exp(-(pi CELLS)^2 / 2) = 5e-9 of the integral (Poisson's summation), and by exp(-REACH^2)."""
+"""Cells of white noise per correlation length, and length of the smoothing kernel to each side, in correlation lengths.
+
+The sum over cells then differs from the integral by a fraction 2 exp(-(pi CELLS)^2 / 2) = 5e-9 (Poisson's summation)
+and by exp(-REACH^2)."""
 
 MOST_CELLS = 10**7
-"""Cells that a rail may have: some 100 MB each time."""
+"""Largest number of cells of a rail, for which arrays of some 100 MB are needed."""
 
 BLOCK = 4
-"""Words that Philox gives for each number that it counts."""
+"""Number of words that Philox gives per count."""
 
 
 def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | None = None) -> np.ndarray:
@@ -83,7 +85,7 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
 
 
 def _rolling(rail: Mapping[str, Any], places: np.ndarray, seed: int) -> np.ndarray | float:
-    """Return the factor of the rolling elements on friction at places [m]."""
+    """Return the factor on friction at places [m] that is due to the rolling elements."""
     if "rolling_pitch" not in rail:
         return 1.0
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(HARMONICS))

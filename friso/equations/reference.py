@@ -1,8 +1,9 @@
-"""The reference within a piece, a polynomial and tones: in symbols for the equations, in numbers for everything else.
+"""The reference within a piece: a polynomial and tones, in symbols for the equations, in numbers for everything else.
 
-A row of numbers describes a piece: its start [s], the derivatives of the polynomial there, and, where there are tones,
-the direction in which the reference moves (1, -1) and for each tone amplitude [m], phase [turns], frequency [Hz] and
-sweep [Hz/s]. The tones' phases and frequencies are those at the start of the piece, so that they stay small.
+A row of numbers describes a piece. It holds the start [s] and the derivatives of the polynomial at the start. With
+tones it also holds the direction in which the reference moves (1, -1), and for each tone amplitude [m], phase [turns],
+frequency [Hz] and sweep [Hz/s]. Phases and frequencies of tones are those at the start of the piece, so that they stay
+small.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
     import sympy as sp
 
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap")
-"""Names of the derivatives of the polynomial."""
+"""Names of the derivatives of the polynomial, from order 0."""
 
 TONE = ("amplitude", "turns", "frequency", "sweep")
-"""Names of the numbers of a tone."""
+"""Names of the parameters of a tone."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
 def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
     """Tell which pieces stand still, in the shape of the rows.
 
-    With the second `derivative`, tell which ones have a constant velocity.
+    With `derivative` 2, tell which ones have a constant velocity.
     """
     rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):

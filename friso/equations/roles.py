@@ -15,23 +15,24 @@ class Role(StrEnum):
     VELOCITY = "velocity"
     """Velocity of a mass [m/s]."""
     BRISTLE = "bristle"
-    """State of the friction law: its memory of the motion. Relaxed, it is 0."""
+    """State of a friction law: its memory of past motion, 0 when relaxed."""
     INTEGRAL = "integral"
-    """State of a controller that winds up while a stage sticks off its reference."""
+    """State of a controller that winds up while the stage sticks away from its reference."""
     FILTER = "filter"
     """State of a controller that settles while its input stays constant."""
     LAG = "lag"
-    """A force on its way from the controller to the stage."""
+    """A force that lags behind the controller's command."""
     DEVIATION = "deviation"
     """A small deviation of another state (variational equations)."""
     SUM = "sum"
-    """Integrated beside a motion, on which it does not act."""
+    """An integral computed alongside a motion, without effect on it."""
 
 
 class Steady(NamedTuple):
     """A steady motion of all masses: error [m], position [m] and velocity [m/s].
 
-    Also the velocity of the reference [m/s] and the controller's force [N]; numbers, arrays or symbols.
+    It also has the velocity of the reference [m/s] and the controller's force [N]. Values are numbers, arrays or
+    symbols.
     """
 
     error: Any

@@ -1,8 +1,8 @@
-"""Controllers as a drive carries them out: a force computed at every sample and held until the next.
+"""Controllers as a sampled drive computes them: the force changes at each sample and is held until the next.
 
-Filters and integrals are discretised block by block, by the rules that the drive has (Franklin, Powell, Workman 1998,
-Digital Control of Dynamic Systems, chapter 6). Without a filter a derivative is a difference over samples. Bode plots
-of a drive with a sample time are of these very equations (`friso.frequency.rates`).
+Filters and integrals are discretised block by block, by the rules of the drive (Franklin, Powell, Workman 1998, Digital
+Control of Dynamic Systems, chapter 6). Without a filter a derivative is a difference over samples. Bode plots of a
+sampled drive use these equations too (`friso.frequency.rates`).
 """
 
 from __future__ import annotations
@@ -36,16 +36,13 @@ SAMPLE_TIME = key("drive.sample_time")
 
 
 def counter(loop: str) -> sp.Symbol:
-    """Return the samples that have passed since a loop, "position" or "velocity", was due."""
+    """Return the number of samples since the "position" or the "velocity" loop last ran."""
     return state(f"samples_of_{loop}")
 
 
 @dataclass(frozen=True)
 class Rest:
-    """Conditions under which integrators rest for a sample, or restart.
-
-    The limit of the force is not among them.
-    """
+    """Conditions under which integrators pause for a sample, or restart, apart from the force limit."""
 
     rests: Any = sp.false
     restarts: Any = sp.false
@@ -71,9 +68,9 @@ def sampled_controller(
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator of a drive: its number, the next one, and what a sample adds to it.
+    """An integrator of a drive: its number, its next value, and its increment per sample.
 
-    It has a gain, a limit of its output, a leak, the period of its loop, and the condition for that loop to be due
+    It has a gain, a limit of its output, a leak, and the period of its loop. `due` is the condition for the loop to run
     (None: at every sample).
     """
 
@@ -87,9 +84,9 @@ class _Integral:
     due: Any
 
     def when_due(self, value: Any, otherwise: Any = 0) -> Any:
-        """Return `value` at samples where the integrator's loop runs, and `otherwise` at the rest.
+        """Return `value` at samples where the integrator's loop runs, else `otherwise`.
 
-        Without a condition (`due` is None), the loop runs at every sample, and it is always `value`.
+        Without a condition (`due` is None) the loop always runs.
         """
         return value if self.due is None else Piecewise((value, self.due), (otherwise, True))
 
@@ -103,9 +100,9 @@ class DiscreteRate:
 
     @classmethod
     def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> DiscreteRate:
-        """Return what stands for s by a rule with a period [s].
+        """Return the substitute for s by a discretisation rule with a period [s].
 
-        Prewarped, it is exact at an angular frequency [rad/s].
+        A prewarped rule is exact at the angular frequency `exact_at` [rad/s].
         """
         if rule == "backward_euler":
             return cls(2 * period, sp.S.Zero)
@@ -116,7 +113,7 @@ class DiscreteRate:
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:
-        """Return the ratio of the substitute to s for slow changes; 1 unless it is prewarped."""
+        """Return the ratio of the substitute to s at low frequencies; 1 unless it is prewarped."""
         return 2 * period / (self.step * (1 + self.weight))
 
     def polynomial(self, polynomial: Polynomial) -> Polynomial:
@@ -140,7 +137,7 @@ class Sampled(Blocks):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """By a counter of samples; what the blocks hold changes where the loop is due."""
+        """Mark blocks as parts of a loop; their numbers change only at samples where the loop runs."""
         if self.form is None or name not in self.form.loops:
             yield
             return
@@ -158,20 +155,20 @@ class Sampled(Blocks):
         self.period, self.due = before
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
-        """By a number, where the loop is not carried out at every sample."""
+        """Pass a signal to a faster loop, which holds the value while the slower loop does not run."""
         if self.due is None:
             return signal
         kept = self._previous(f"{name}_handed_on", signal.value, signal.settled)
         return replace(signal, value=Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
-        """Return the number that a value was at the sample before."""
+        """Return the value of an expression at the previous sample, as a held number."""
         symbol = state(name)
         self.held.append(Held(symbol, value, settled))
         return symbol
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
-        """By the rule; `tau` [s]."""
+        """Return the low-passed signal, discretised by the rule; `tau` [s]."""
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / tau)
         seen = signal.value + rate.weight * before
@@ -183,11 +180,14 @@ class Sampled(Blocks):
 
     @property
     def _own_rule(self) -> FilterRule:
-        """Return the rule for a low-pass of the controller's own."""
+        """Return the discretisation rule for low-passes of the controller itself."""
         return "backward_euler" if self.form and self.form.filter_rule == "backward_euler" else "bilinear"
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """With a low-pass by the drive's rule, else a difference over samples; `tau` [s]."""
+        """Return the derivative of a signal; `tau` [s].
+
+        It is low-passed by the drive's rule or, without `tau`, a difference over samples.
+        """
         scale = signal.scale / self.period
         if tau is not None:
             slope = (signal.value - self.low_pass(signal, tau, name).value) / tau
@@ -206,7 +206,7 @@ class Sampled(Blocks):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """Return an integral as a number that every sample adds to; `gain` [N per unit].
+        """Return the integral of a signal, a number that grows at every sample; `gain` [N per unit].
 
         Raises ValueError for an unknown rule.
         """
@@ -227,7 +227,7 @@ class Sampled(Blocks):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """By the rule, from two samples back."""
+        """Return a signal behind a second-order filter, discretised by the rule."""
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
         (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))
         lag = (upper[1] - upper[0] * lower[1]) * rate.scale(self.period)
@@ -245,17 +245,17 @@ class Sampled(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """As it is at a sample."""
+        """Return the limited signal, by its value at a sample."""
         return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
     def dead_zone(self, error: Signal) -> Signal:
-        """As the error is at a sample."""
+        """Return the error less the deadband, by its value at a sample."""
         band = self.key("error_deadband")
         value, settled = (part - clipped(part, band) for part in (error.value, error.settled))
         return replace(error, value=value, settled=settled, rate=None, before=None)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """As the error is at a sample."""
+        """Return the force with the standstill gains, by the error at a sample."""
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))
         self.gains = Piecewise((factor, sp.Abs(error.value) < window), (1, True))
         settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
@@ -270,7 +270,7 @@ class Sampled(Blocks):
         return replace(total, value=value, settled=resting, rate=None, before=None)
 
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """As error and reference are at a sample."""
+        """Return the pushing force, by error and reference at a sample."""
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
             Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
@@ -278,7 +278,7 @@ class Sampled(Blocks):
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
     def dither(self) -> Signal:
-        """By the number of turns at a sample."""
+        """Return the dither force, by the number of turns at a sample."""
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         turn = state("dither_turn")
         following = turn + frequency * SAMPLE_TIME
@@ -286,7 +286,7 @@ class Sampled(Blocks):
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _standstill(self, error: sp.Expr) -> Rest:
-        """Return when integrals pause, and when they begin anew, by the settings against friction."""
+        """Return the conditions under which the settings against friction pause and restart integrals."""
         rests: Any = sp.false
         restarts: Any = sp.false
         if self.settings.deadband:
@@ -305,9 +305,9 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before its limit, and all numbers held, with integrators at limits.
+        """Return the force before its limit, and all held numbers, with the integrators' behaviour at limits.
 
-        Integrators follow the anti-windup where the force would exceed its limit. They rest where their output would
+        Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.
         """
         settings = self._standstill(demand.error.value) if self._integrals else Rest()

@@ -1,4 +1,4 @@
-"""Stages with more friction, or with less: all of it scaled, or static friction alone."""
+"""Scale the friction of stages: all of it, or static friction alone."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
 
 
 def least_static_factor(flat: Mapping[str, Any]) -> float:
-    """Return the least factor on static friction at which it still reaches Coulomb friction."""
+    """Return the smallest factor on static friction for which it is at least Coulomb friction."""
     return max(float(np.max(flat[coulomb] / flat[static])) for static, coulomb in static_frictions(flat).items())
 
 
@@ -36,12 +36,12 @@ def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]
 def with_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     """Return stages with a multiple of their friction.
 
-    Every force, stiffness and damping of a law is multiplied, so that deflections and speeds stay.
+    Every force, stiffness and damping of a law is multiplied, so that its deflections and speeds do not change.
     """
     forces = [key for key, kind in numeric_keys(flat).items() if key.partition(".")[0] in TABLES and _is_force(kind)]
     return {**flat, **{key: flat[key] * factor for key in forces if key in flat}}
 
 
 def _is_force(kind: Any) -> bool:
-    """Tell whether a quantity is a force, or one per speed or distance."""
+    """Tell whether a quantity is a force, or a force per speed or distance."""
     return str(kind.unit).startswith("N")

@@ -1,7 +1,7 @@
-"""The settings of drives against friction, one catalogue: what each does, its sizes for a machine, and its ranges.
+"""Catalogue of a drive's settings against friction: the effect of each, its values for a machine, and its ranges.
 
 Their keys are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
---also` tries one size of each, `friso tune` their ranges.
+--also` tries one value of each setting; `friso tune` searches their ranges.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ from friso.stage.transmission import moving_mass
 FlatMachine = Mapping[str, Any]
 Sizes = Callable[[FlatMachine, float], dict[str, float]]
 Ranges = Callable[[FlatMachine, float], dict[str, tuple[float, float]]]
-"""From the flat keys of a stage and the tolerance for being in position [m] to values [SI] of names in [controller], or
-to their ends."""
+"""Function of a stage's flat keys and the position tolerance [m].
+
+It returns values [SI], or ends of ranges, by name in the table [controller]."""
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
-"""Ranges of the integral limit, in units of the break-away friction, and of the leak, in units of the bandwidth or,
-where no key states one, of 1 Hz."""
+"""Ranges of the integral limit, relative to break-away friction, and of the leak, relative to the bandwidth.
+
+Where no key states a bandwidth, the leak is relative to 1 Hz."""
 
 DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
-"""Ranges of the deadband, and of the error that ends it, in tolerances."""
+"""Ranges of the deadband, and of the error that ends it, relative to the tolerance."""
 
 WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
-"""Ranges of the standstill window, in tolerances, and of the gains in it."""
+"""Ranges of the standstill window, relative to the tolerance, and of the factor on the gains within it."""
 
 AMPLITUDES, FREQUENCIES = (0.1, 1.5), (3.0, 30.0)
-"""Ranges of a dither: its amplitude in units of sliding friction, its frequency in units of the mass's on the loop's
-stiffness."""
+"""Ranges of a dither's amplitude, relative to sliding friction, and of its frequency.
+
+The frequency is relative to the natural frequency of the mass on the loop's stiffness."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Setting:
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     """Return the stage's flat keys for each set of gains that its loop may have.
 
-    They are its own, and those within a window of standstill.
+    There is one set outside the standstill window, and one within it.
     """
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:
@@ -112,7 +115,7 @@ def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]
 
 
 def _own_frequency(flat: FlatMachine) -> float:
-    """Return the frequency [Hz] of the moving mass on the loop's proportional stiffness.
+    """Return the natural frequency [Hz] of the moving mass on the loop's proportional stiffness.
 
     It is 0 without that stiffness.
     """

@@ -1,5 +1,4 @@
-"""Describe the equations that a stage needs;
-stages of equal structure share them and differ in numbers only."""
+"""Describe the structure of a stage's equations; stages of one structure differ in numbers only."""
 
 from __future__ import annotations
 
@@ -74,8 +73,8 @@ class ControllerForm:
 class TransmissionForm:
     """Structure of a transmission.
 
-    It has a backlash or not; a friction law at the motor ("none": no friction there) with its choices; and the sides on
-    which position and velocity are measured.
+    It tells whether there is backlash, which friction law acts at the motor ("none": no friction) with its choices, and
+    on which sides position and velocity are measured.
     """
 
     backlash: bool
@@ -87,12 +86,14 @@ class TransmissionForm:
 
 @dataclass(frozen=True)
 class Structure:
-    """The choices that decide which states, terms and kinks there are.
+    """The choices that decide which states, terms and kinks the equations have.
 
-    `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is
-    whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number);
-    `load_follows` whether its levels grow with the acceleration of the reference; `reference` is of what its pieces are
-    made; `limiter_pulls` whether a touched limiter may pull by its damping.
+    - `masses` are the names of the masses given, for a rigid stage.
+    - `biased` are the names of the masses on which a constant force acts.
+    - `friction_variant` is any further choice of the friction law, such as a Stribeck exponent that is a whole number.
+    - `load_follows` tells whether friction grows with the acceleration of the reference.
+    - `reference` describes the pieces of the reference.
+    - `limiter_pulls` tells whether a touched limiter may pull by its damping.
     """
 
     masses: tuple[str, ...]
@@ -109,12 +110,12 @@ class Structure:
 
     @property
     def standing(self) -> Structure:
-        """Return the structure with a reference that stands."""
+        """Return the structure with a reference that stands still."""
         return replace(self, reference=QUADRATIC)
 
     @property
     def plays(self) -> bool:
-        """Tell whether there is a backlash."""
+        """Tell whether there is backlash."""
         return self.transmission is not None and self.transmission.backlash
 
     @property
@@ -156,12 +157,12 @@ def structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def shared_structure(flat: Mapping[str, Any]) -> Structure:
-    """Return the structure of stages that all have the same, read off the first of them."""
+    """Return the common structure of stages, read from the first of them."""
     return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the numeric keys on which the structure depends, as by being zero."""
+    """Return the numeric keys that decide on the structure, for example by being zero."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
     of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH, *DECISIVE)
     at_motor: tuple[str, ...] = ()

@@ -16,14 +16,14 @@ from friso.equations.masses import Body, beyond_stops, stops
 from friso.stage.transmission import MOTOR_FRICTION, STATE_PREFIX
 
 BACKLASH = key("transmission.backlash")
-"""The whole play [m], from one flank to the other."""
+"""Total backlash [m], from flank to flank."""
 
 
 def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Component]:
     """Return the force of the transmission on the load [N], and its kinks.
 
-    There is no force within a backlash. On a flank the spring carries what exceeds half of it, and the damper acts
-    beside it.
+    The force is 0 within the backlash. On a flank the spring acts on the deflection beyond half the backlash, in
+    parallel with the damper.
     """
     deflection, rate = motor.position - load.position, motor.velocity - load.velocity
     stiffness = key("transmission.stiffness")
@@ -40,17 +40,17 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
 
 
 def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:
-    """Return the kinks at which the transmission begins to pull, ahead and behind.
+    """Return the kinks at which the transmission touches its flanks, ahead and behind.
 
-    `deflection` [m] is the motor's against the load.
+    `deflection` [m] is the position of the motor relative to the load.
     """
     return stops(deflection, BACKLASH / 2, "flank")
 
 
 def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:
-    """Return a friction law moved to the motor, with names and keys of its own.
+    """Return a friction law moved to the motor, with separate names and keys.
 
-    It was declared for a body with a `velocity`.
+    `velocity` is that of the body for which the law was declared.
     """
     component = friction.component
     names = {x: _renamed(str(x)) for x in (part.symbol for part in component.states)}
@@ -85,7 +85,7 @@ def _renamed(name: str, before: str = "") -> str:
 
 
 def _expressions(friction: Friction) -> list[sp.Expr]:
-    """Return all that a law declares."""
+    """Return all expressions that a law declares."""
     component = friction.component
     expressions = [friction.force, friction.breakaway]
     expressions += [e for part in component.states for e in (part.derivative, part.scale, part.settled)]

@@ -19,19 +19,19 @@ from friso.equations.component import TIME, Kink, Role, State, Switch, key, stat
 from friso.equations.model import Model
 
 PREFIX = "small_"
-"""First letters of the names of deviations."""
+"""Prefix of the names of deviations."""
 
 
 def along(name: str) -> str:
-    """Return the parameter that holds by how much a key differs on the motion beside."""
+    """Return the parameter that holds the difference of a key in a neighbouring motion."""
     return f"along.{name}"
 
 
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
-    """Return the model extended by a small deviation of each state, the states first.
+    """Return the model extended by a small deviation of each state; the states come first.
 
-    The deviations take no part in the control of the step. With `keys`, they are sensitivities to these keys: each key
-    differs in the neighbouring motion by its parameter `along`, times the unit of the deviation.
+    The deviations do not influence the step size. With `keys`, they are sensitivities. In the neighbouring motion each
+    key differs by its parameter `along`, times the unit of the deviation.
     """
     beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     small = beside | {key(name): key(along(name)) for name in keys}
@@ -56,7 +56,7 @@ Small = Mapping[sp.Symbol, sp.Symbol]
 
 
 def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
-    """Derivative of an expression along the deviation."""
+    """Return the derivative of an expression along the deviation."""
     terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
     return sum(terms, start=sp.S.Zero)
 
@@ -64,7 +64,7 @@ def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
     """Return the jump of deviations at a kink.
 
-    It is (f+ - f-) times their share across the kink over the speed of crossing.
+    It is (f+ - f-) times the component of the deviation across the kink, divided by the speed of crossing.
     """
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
@@ -99,9 +99,9 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Tell whether a difference is zero all over the surface of a kink, tried at points of it.
+    """Tell whether a difference is zero everywhere on the surface of a kink, tested at some points of it.
 
-    It is not if the surface is linear in no symbol: such a surface bounds a window in which something is switched.
+    It counts as not zero if the surface is linear in no symbol; such a surface bounds a window.
     """
     if gap == 0:
         return True
@@ -123,4 +123,4 @@ def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
 
 
 TRIED, DIGITS, NOTHING = 3, 50, 1e-25
-"""Points of a surface at which a difference is tried, digits to which it is computed, and what counts as 0."""
+"""Number of points at which a difference is tested, decimals of its value, and the bound below which it counts as 0."""

@@ -1,1 +1,1 @@
-"""Stages as linear systems: limit cases and the family behind them, margins, how fast a controller may be."""
+"""Analyse stages as linear systems: limit cases and the family behind them, margins, highest bandwidth."""

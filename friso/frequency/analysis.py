@@ -1,4 +1,4 @@
-"""`friso.linear`: a stage in one of its states as a linear system of python-control."""
+"""Return a stage in one of its states as a linear system of python-control (`friso.linear`)."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _closed(flat: Mapping[str, Any], member: Members) -> System:
 
 
 def _at_axis(system: System) -> System:
-    """Without velocity and the position that it is of, which are the controller's business."""
+    """Return the system without the velocity channel, which only the controller uses."""
     return system.take(system.inputs, [name for name in system.outputs if name not in (VELOCITY, RATED)])
 
 

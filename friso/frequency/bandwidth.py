@@ -1,4 +1,4 @@
-"""The bandwidth of a loop: the highest frequency at which its gain is 1, whatever its controller calls so."""
+"""Compute the bandwidth of a loop: the highest frequency at which its gain is 1, for any controller."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from friso.frequency.members import Members, limit_cases
 from friso.stage import Stage
 
 GRID = np.geomspace(0.01, 1e4, 800)
-"""Frequencies [Hz] at which the loops of many points are looked at for their bandwidth, beside those about resonances
-of the stage."""
+"""Frequencies [Hz] at which loops are evaluated for their bandwidth, beside those near resonances of the stage."""
 
 
 def loop_bandwidth(stage: Stage) -> float:
@@ -52,8 +51,8 @@ def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.nda
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the bandwidths [Hz] of a stage with changes, arrays (count,), in continuous time.
 
-    They are exact to a share of 1e-3: the loop is computed on a grid of frequencies, and its gain is a power of
-    frequency in between. If the gains at standstill differ, the larger bandwidth counts.
+    They are accurate to a relative error of 1e-3: the loop is computed on a grid of frequencies, and its gain is a
+    power of frequency in between. If the gains at standstill differ, the larger bandwidth counts.
     """
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
@@ -62,9 +61,9 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
-    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,).
+    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,); NaN without any.
 
-    They are sought on a grid of angular frequencies [rad/s]; NaN if there is none.
+    They are searched on a grid of angular frequencies [rad/s].
     """
     loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))

@@ -1,4 +1,4 @@
-"""The whole linear analysis of a stage: limit cases, the family behind them, and how fast its controller may be."""
+"""Analyse a stage linearly: limit cases, the family behind them, and the highest bandwidth of its controller."""
 
 from __future__ import annotations
 
@@ -73,9 +73,9 @@ class Prescribed:
 class Bode:
     """The linear analysis of a stage.
 
-    `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
-    the thesis's formula for a touched limiter ("-series"); and, of a cascade, each of its loops, `cascades` by limit
-    case. All else is computed once it is asked for.
+    `omega` (k,) [rad/s] are the frequencies of all curves; `cases` are the limit cases by name, optionally with the
+    thesis's formula for a touched limiter ("-series"); `cascades` are the loops of a cascade by limit case. All else is
+    computed on demand.
     """
 
     stage: Stage
@@ -96,7 +96,7 @@ class Bode:
 
     @property
     def stable(self) -> bool:
-        """Tell whether the one controller is stable in every state of the family."""
+        """Tell whether the controller is stable in every state of the family."""
         return bool(self.scan.stable.all())
 
     @cached_property
@@ -124,10 +124,7 @@ class Bode:
 
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
-        """Return how fast the controller may be, for the joint "locked" and "free".
-
-        Without a joint the only entry is "given".
-        """
+        """Return the ranges of stable crossovers, for the joint "locked" and "free", or "given" without a joint."""
         stages = _by_joint(self.stage)
         return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
@@ -178,21 +175,21 @@ def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
 
 
 def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Complex:
-    """Stage position over force [m/N] of a stage in one state, exactly."""
+    """Return stage position over force [m/N] of a stage in one state, exactly."""
     return plant(flat, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """Return the cases with a touched limiter, modelled as in Table 1 of the thesis.
+    """Return the cases with a touched limiter modelled as in Table 1 of the thesis.
 
-    There the limiter is in series with the joint, so that the stage is one with another joint and no touched limiter.
+    The limiter is in series with the joint there, so the stage has another joint and no touched limiter.
     """
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
-    """Frequencies [Hz] that show all crossovers and resonances."""
+    """Return a range of frequencies [Hz] that shows all crossovers and resonances."""
     settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
@@ -206,7 +203,7 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
-    """Return the loop at prescribed speeds of the cart, its limiter free where it can be."""
+    """Return the loops at prescribed speeds of the cart, with the limiter free if possible."""
     if flat["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
@@ -219,10 +216,7 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 
 
 def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
-    """Return the ranges of speed at which the stage is not stable.
-
-    They are given for each state of the limiter and each direction.
-    """
+    """Return the ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
     sliding = members[~members.stuck]
     ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):

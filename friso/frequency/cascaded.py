@@ -1,10 +1,9 @@
-"""The loops of a cascade one by one, each opened where a drive's Bode plot opens it.
+"""Compute the loops of a cascade separately, each opened where a drive's Bode plot opens it.
 
-The plant is what a drive records from the force that it commands to the velocity at its encoder. The velocity loop is
-cut where the velocity is fed back, the position loop being open; the position loop where the position is fed back, the
-velocity loop being closed (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at
-several rates both are characteristic loci (`friso.frequency.rates`), which do not depend on where in its way a loop is
-cut.
+The plant leads from the commanded force to the velocity at the encoder. The velocity loop is cut where the velocity is
+fed back, with the position loop open; the position loop where the position is fed back, with the velocity loop closed
+(Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are
+characteristic loci (`friso.frequency.rates`), which do not depend on the place of the cut.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class CascadeLoops:
 
 
 def is_cascade(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage's controller closes a velocity loop within its position loop."""
+    """Tell whether a stage's controller has a velocity loop within its position loop."""
     return controller_of(flat).feeds_back == "velocity"
 
 
@@ -69,14 +68,14 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
 
 
 def _seen(rates: Complex) -> np.ndarray:
-    """Return which of the poles [rad/s] of a velocity loop (1, n) it sees, shape (n,)."""
+    """Return which poles [rad/s] of a velocity loop (1, n) the loop can affect, shape (n,)."""
     settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
     return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
-    """Return the position loop over angular frequencies [rad/s], the velocity loop closed."""
+    """Return the position loop over angular frequencies [rad/s], with the velocity loop closed."""
     if not drive.sample_time:
         outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
         return lambda omega: outer(omega) / (1 + inner(omega))

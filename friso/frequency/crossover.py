@@ -1,5 +1,4 @@
-"""Find how fast a controller may be: the crossovers at which a stage is stable with the
-wanted modulus margin."""
+"""Find the crossovers at which a stage is stable, and has the required modulus margin."""
 
 from __future__ import annotations
 
@@ -26,21 +25,21 @@ from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex
 
 WANTED = 0.5
-"""Modulus margin that is called comfortable: a peak sensitivity of 2, 6 dB."""
+"""Modulus margin that counts as comfortable: a peak sensitivity of 2, 6 dB."""
 
 
 @dataclass(frozen=True)
 class Limits:
     """The crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
 
-    They are ranges from `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
+    They are ranges within `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
     limiter free or touched.
 
-    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest).
-    `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None if there is no such range.
-    `first_lost` is the state that becomes unstable just above the first, `closest` the state that comes closest to -1
-    just above the second (None at the end of the search); if there is no such range, they are taken at the stage's own
-    crossover. For a controller given by gains all values are factors of its bandwidth.
+    For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
+    `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
+    the state that becomes unstable just above the first, `closest` the state that comes closest to -1 just above the
+    second (None at the end of the search); without a range, they are those at the stage's own crossover. For a
+    controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -53,7 +52,7 @@ class Limits:
 
     @property
     def open_ended(self) -> bool:
-        """Tell whether the stage is still stable where the search ends."""
+        """Tell whether the stage is still stable at the end of the search."""
         return self.highest_stable == self.searched[1]
 
 
@@ -93,10 +92,7 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """Return the range of crossovers that is searched.
-
-    With a sampled drive it ends below half the sampling frequency.
-    """
+    """Return the range of crossovers that is searched, which ends below half the sampling frequency of a drive."""
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
@@ -105,7 +101,7 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of the settled states; 0 if one is not stable."""
+    """Return the least modulus margin of the settled states; 0 if one is unstable."""
     loops = scan_stability(flat, settled_members(flat))
     return float(loops.distance.min()) if loops.stable.all() else 0.0
 
@@ -113,7 +109,7 @@ def settled_margin(flat: Mapping[str, Any]) -> float:
 def settled_members(flat: Mapping[str, Any]) -> Members:
     """Return the limit cases, and the states stuck under a bias force.
 
-    A stage is in one of them unless it creeps or just broke away, while its friction falls with speed.
+    A stage is in one of them unless it creeps or has just broken away, while its friction falls with speed.
     """
     settings = FrequencySettings.current()
     members = family(flat, settings.search_biases, 2)
@@ -121,10 +117,7 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 
 def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Tell whether samples and delays of a drive alone make the loop unstable.
-
-    The first answer is for a stage that sticks, the second for one that slides.
-    """
+    """Tell whether only samples and delays of a drive make the loop unstable, for a sticking and a sliding stage."""
     members = settled_members(flat)
     smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
     if len(smooth) == len(flat):
@@ -134,7 +127,7 @@ def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
 
 
 def _stated(flat: Mapping[str, Any]) -> float:
-    """Return the crossover of a stage [Hz]; 1 where its controller states none."""
+    """Return the crossover of a stage [Hz]; 1 for a controller that states none."""
     named = bandwidth(flat)
     return 1.0 if named is None else named
 
@@ -147,7 +140,7 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 class _Search:
     """A search over crossovers of a stage's controller, in all its settled states.
 
-    Arrays have the shape (crossovers,). What does not depend on the crossover is computed once.
+    Arrays have the shape (crossovers,). Parts that do not depend on the crossover are computed once.
     """
 
     flat: Mapping[str, Any]
@@ -159,7 +152,7 @@ class _Search:
 
     @cached_property
     def at(self) -> np.ndarray:
-        """Return the crossovers between which ends of ranges are looked for."""
+        """Return the crossovers between which ends of ranges are located."""
         settings = FrequencySettings.current()
         return np.geomspace(*self.ends, settings.crossover_steps)
 
@@ -168,11 +161,11 @@ class _Search:
         return ranges_below(self.at, lambda f: self.abscissa(f).max(axis=1))
 
     def abscissa(self, crossover: np.ndarray) -> np.ndarray:
-        """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
+        """Return the real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
         return self._by_poles(crossover).abscissa.reshape(len(crossover), -1)
 
     def distance(self, crossover: np.ndarray) -> np.ndarray:
-        """Least distance of the loop from -1, shape (crossovers, members)."""
+        """Return the least distance of the loop from -1, shape (crossovers, members)."""
         omega, loops_of = self._loops
         held = DriveTiming.of(self.flat).transfer(omega)
         shared = np.array([distance_to_lines(loops_of(_at(self.flat, f)) * held) for f in crossover])
@@ -180,10 +173,9 @@ class _Search:
 
     @cached_property
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
-        """Return frequencies [rad/s] that resolve the loop at all crossovers, and loops there.
+        """Return frequencies [rad/s] that resolve the loop at all crossovers, and a function for loops there.
 
-        Frequencies are always the same, so that the distance is a smooth function. The loops are for the keys of any
-        controller.
+        Frequencies are fixed, so that the distance is a smooth function. The function takes the keys of any controller.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
@@ -198,6 +190,6 @@ class _Search:
         return self._looked_at(self.at)
 
     def _looked_at(self, crossover: np.ndarray) -> PoleStability:
-        """Return all members at the first crossover, then at the second, and so on."""
+        """Return the stability of all members at the first crossover, then at the second, and so on."""
         keys = _at(self.flat, np.repeat(crossover, len(self.members)))
         return stability_by_poles(keys, self.members.repeated(len(crossover)))

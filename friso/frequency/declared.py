@@ -1,4 +1,4 @@
-"""From declared equations to linear systems: their Jacobian, written out once and evaluated for many members."""
+"""Linearise declared equations: derive their Jacobian once, and evaluate it for many members."""
 
 from __future__ import annotations
 
@@ -53,5 +53,5 @@ class Declared:
 
 
 def sine(turns: Any) -> Any:
-    """sin(2 pi x) of a number of turns x, for `friso.equations.component.sine`."""
+    """Return sin(2 pi x) of a number of turns x, for `friso.equations.component.sine`."""
     return np.sin(2 * np.pi * turns)

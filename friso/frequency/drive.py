@@ -1,4 +1,4 @@
-"""The drive that carries out the controller: hold, delay and current loop before the plant."""
+"""Model the drive that executes the controller: hold, delay and current loop before the plant."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from friso.frequency.system import Complex, System
 from friso.stage.rig import LOOPS
 
 SLOW_LOOPS = tuple(f"drive.{name}_sample_time" for name in LOOPS)
-"""Keys of the sample times of loops that are carried out more slowly."""
+"""Keys of the sample times of slower loops."""
 
 PADE_6 = tuple(comb(6, k) / (comb(12, k) * factorial(k)) for k in range(7))
 """Coefficients of the numerator of Pade's approximation of order 6 to the exponential."""
 
 SCALED = 0.5
-"""Norm to which matrices are scaled for it: its relative error is then below 1e-16."""
+"""Norm to which matrices are scaled for the exponential, whose relative error is then below 1e-16."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class DriveTiming:
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
         """Return the drive of a stage.
 
-        Raises InputError for a delay of more samples than are followed, and for a loop that is due as rarely.
+        Raises InputError for a delay of too many samples, and for a loop that is due too rarely.
         """
         settings = FrequencySettings.current()
         sample_time = flat.get("drive.sample_time", 0.0)
@@ -68,7 +68,7 @@ class DriveTiming:
 
     @property
     def samples_late(self) -> tuple[int, float]:
-        """Return the delay as whole samples, and the rest [s]."""
+        """Return the delay as whole samples, and the remaining time [s]."""
         samples = int(self.delay / self.sample_time + 1e-9)
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
@@ -122,7 +122,7 @@ def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
 
 
 def waited(machine: System, samples: int) -> System:
-    """Return a plant with one input in discrete time whose force waits for some samples."""
+    """Return a plant with one input in discrete time whose force is delayed by some samples."""
     if not samples:
         return machine
     register = np.eye(samples, k=-1)
@@ -134,8 +134,8 @@ def waited(machine: System, samples: int) -> System:
 def delayed(machine: System, delay: float, loop: float) -> System:
     """Return a plant with one input behind a delay [s], as a row of rational functions (Pade).
 
-    The closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own
-    resonances turn too often within the delay.
+    The closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError if the plant's own
+    resonances turn too far within the delay.
     """
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
@@ -163,7 +163,7 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """Return a plant with one input behind another system, given by its four matrices."""
+    """Return a plant with one input behind another system, given by four matrices."""
     la, lb, lc, ld = first
     members, n, k = len(machine.a), len(machine.states), len(la)
     a = np.zeros((members, n + k, n + k))
@@ -175,7 +175,7 @@ def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System
 
 
 def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return how states and a constant force act on the states a time [s] later."""
+    """Return the effect of states and of a constant force on the states after a time [s]."""
     n = len(machine.states)
     matrices = np.zeros((len(machine.a), n + 1, n + 1))
     matrices[:, :n, :n], matrices[:, :n, n:] = machine.a * time, machine.b * time

@@ -1,5 +1,4 @@
-"""Analyse a family of states at once: friction is an impedance between cart and ground,
-the masses are computed once.
+"""Analyse a family of states at once: friction is an impedance between cart and ground, the masses are computed once.
 
 The masses without friction respond to forces on stage and cart by g (2 x 2), and by h with the cart held. With the
 dynamic stiffness k = s Z of friction on the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large
@@ -32,7 +31,7 @@ _T = TypeVar("_T")
 
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Frequencies about a member's own closed-loop resonances at which it is evaluated, in units of their half widths."""
+"""Frequencies about a member's closed-loop resonances at which it is evaluated, in half widths."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class Scan:
 
     @property
     def abscissa(self) -> np.ndarray:
-        """Real part [1/s] of the rightmost closed-loop pole."""
+        """Return the real part [1/s] of the rightmost closed-loop pole."""
         return self.by_poles.abscissa
 
     @property
@@ -60,8 +59,8 @@ class Scan:
     def distance(self) -> np.ndarray:
         """Return the least distance of each member's loop from -1.
 
-        It is computed on frequencies that all share and about each member's closed-loop resonances, and exactly for
-        the members that come closest to -1.
+        It is computed on common frequencies and near each member's closed-loop resonances, and exactly for the members
+        that come closest to -1.
         """
         settings = FrequencySettings.current()
         omega = frequency_grid(self.flat, settings.family_density)
@@ -78,9 +77,9 @@ class Scan:
         return distance
 
     def worst(self, among: np.ndarray | None = None) -> int:
-        """Return the index of the worst state: the least stable, else the one closest to -1.
+        """Return the index of the worst state: the least stable, or the one closest to -1.
 
-        `among` marks the states to look at; all of them if it is None.
+        `among` marks the states to consider; None stands for all.
         """
         among = np.ones(len(self.members), bool) if among is None else among
         if not self.stable[among].all():
@@ -89,7 +88,7 @@ class Scan:
 
 
 def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
-    """Stability of every member, and its modulus margin."""
+    """Return the stability of every member, and its modulus margin."""
     return Scan(flat, members, stability_by_poles(flat, members))
 
 
@@ -182,14 +181,14 @@ def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 
 
 def closed_loop_poles(flat: Mapping[str, Any], members: Members) -> Complex:
-    """Finite closed-loop poles [rad/s] of members."""
+    """Return the finite closed-loop poles [rad/s] of members."""
     drive = DriveTiming.of(flat)
     roots = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
     return roots[np.isfinite(roots)]
 
 
 def plant_poles(flat: Mapping[str, Any], members: Members) -> Complex:
-    """Poles [rad/s] of the plant in all these states."""
+    """Return the poles [rad/s] of the plant in all these states."""
     return np.concatenate([np.linalg.eigvals(plant(flat, kind).a).ravel() for kind in members.kinds]).astype(complex)
 
 
@@ -232,7 +231,8 @@ def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Compl
 def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
     """Return a function from controller keys to L without hold, delay and current loop.
 
-    L has the shape (members, k) over angular frequencies (k,) [rad/s]. What the controller moves is computed once.
+    L has the shape (members, k) over angular frequencies (k,) [rad/s]. Parts that do not depend on the controller are
+    computed once.
     """
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
@@ -242,7 +242,7 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
 
 
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """Return what is measured over the force, shape (members, k, 2), from the whole plant.
+    """Return the measured signals over the force, shape (members, k, 2), from the whole plant.
 
     They are position [m/N] and velocity [m/(N s)] or, sampled, the position that is differentiated. Encoders may be on
     different sides of a transmission.

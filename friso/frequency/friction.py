@@ -1,4 +1,4 @@
-"""The friction law of a stage as a linear system; its steady force, and the speeds over which that differs."""
+"""Linearise the friction law of a stage, and compute its steady force and range of speeds."""
 
 from __future__ import annotations
 
@@ -31,9 +31,8 @@ FORWARD = str(direction(VELOCITY).beyond)
 class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force.
 
-    It also has the law's steady states, sliding at a velocity and bearing a bias force at rest. These are its internal
-    states, then its modes that remember and the sides of its kinks. The lengths [m] among the scales of its states
-    belong to it.
+    It also has the law's steady states, sliding at a velocity and bearing a bias force at rest: internal states, then
+    modes that remember and the sides of kinks. The lengths [m] among the scales of its states belong to it.
     """
 
     declared: Declared
@@ -56,7 +55,7 @@ def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of the motor's friction, with its states named as there; None without any."""
+    """Return the law of the motor's friction, with its states named as at the motor; None without friction."""
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
     if law is None:
@@ -92,7 +91,7 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
     """Return the internal states of the friction law that bear the bias at rest.
 
-    All are pulled as far as the cart, from where they bear nothing.
+    All are deflected equally from their unloaded state.
     """
     pulled = sp.Symbol("pulled", real=True)
     relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}
@@ -108,7 +107,7 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
     """Return a function that evaluates expressions from values of their symbols, by name.
 
-    Numbers that no float holds become infinite or NaN.
+    Overflow gives infinity or NaN.
     """
     symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
     function = sp.lambdify(symbols, expressions, [{"sine": sine}, "numpy"])
@@ -121,7 +120,7 @@ def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[
 
 
 def level(flat: Mapping[str, Any], forward: bool) -> float:
-    """Return the friction force [N] at which a stuck cart breaks away; 0 if it creeps instead."""
+    """Return the friction force [N] at which a stuck cart breaks away; 0 for a law that creeps."""
     law = law_of(leading_friction(flat))
     return float(steady_force(flat, np.zeros(1), forward)[0]) if law is not None and law.states else 0.0
 
@@ -138,7 +137,7 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
+    """Return speeds [m/s] from creeping to so fast that friction hardly depends on speed, shape (count,)."""
     settings = FrequencySettings.current()
     flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}

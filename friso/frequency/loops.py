@@ -1,4 +1,4 @@
-"""The loop of plant, controller and drive: closed, and cut at the actuator force."""
+"""Build the loop of plant, controller and drive: closed, and cut at the actuator force."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
-"""Share of the fastest pole by which rounding may move a slow one."""
+"""Rounding error of a slow pole over the fastest pole."""
 
 
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
@@ -78,7 +78,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
 class Poles:
     """Poles of the `closed` and of the `cut` loop with its drive, both of shape (members, n).
 
-    They lie in the plane of s [rad/s], or of z if the drive samples. `continuous` are the poles of the closed loop in
+    They are in the plane of s [rad/s], or of z for a sampled drive. `continuous` are the poles of the closed loop in
     continuous time without delay.
     """
 
@@ -122,7 +122,7 @@ class Poles:
     def loop(self, omega: np.ndarray) -> Complex:
         """Return L at angular frequencies (k,) [rad/s], shape (members, k).
 
-        Its error is a share of its size and of 1.
+        Its error is relative to its size and to 1.
         """
         at = self._at(omega)
         ratio = np.ones((len(self.closed), len(omega)), complex)

@@ -9,7 +9,7 @@ import numpy as np
 from friso.frequency.settings import FrequencySettings
 
 EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
-"""Where a step with an end is divided: evenly, and about the zero of a straight line, as shares of it."""
+"""Where a step with an end is divided: evenly, and about the zero of a straight line, as fractions of it."""
 
 Range = tuple[float, float]
 

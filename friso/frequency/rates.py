@@ -61,7 +61,7 @@ class Lifted:
         return _fundamental(self.over(turn), turn)
 
     def locus(self, turn: np.ndarray) -> Complex:
-        """Return the characteristic locus that is the loop at that frequency, shape (members, k)."""
+        """Return the characteristic locus that belongs to the loop at that frequency, shape (members, k)."""
         return locus_of(self.over(turn), turn)
 
 
@@ -87,9 +87,9 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
     """Return the controller at each sample of a period.
 
-    Its inputs are the measured position and the position whose rate is the measured velocity [m], its outputs the
-    force [N] and what is held for the next sample. A controller that feeds back one encoder's position does not use
-    the second input.
+    Its inputs are the measured position and the position whose rate is the measured velocity [m], its outputs the force
+    [N] and the numbers held for the next sample. A controller that feeds back one encoder's position does not use the
+    second input.
     """
     form = shared_structure(flat)
     assert form.controller is not None
@@ -109,7 +109,7 @@ def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tu
 
 
 def _samples(flat: Mapping[str, Any], name: str) -> int:
-    """Samples after which a loop is due again."""
+    """Return the samples after which a loop is due again."""
     key = f"drive.{name}_sample_time"
     return round(float(flat[key] / flat["drive.sample_time"])) if key in flat else 1
 
@@ -118,7 +118,7 @@ def _samples(flat: Mapping[str, Any], name: str) -> int:
 def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_samples: int) -> Declared:
     """Return the controller at a sample at which some loops are due, for small motions.
 
-    With `both`, the two measured positions are told apart.
+    With `both`, the two measured positions are distinguished.
     """
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
     y, rated = sp.symbols("measured_position measured_rated", real=True)
@@ -132,7 +132,7 @@ def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_
 
 
 def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
-    """Return how a period carries the states of the closed loop along, (members, n, n)."""
+    """Return how the states of the closed loop change over a period, (members, n, n)."""
     whole = _identity(machine, controls[0])
     for control in controls:
         whole = _step(machine, control, 1.0) @ whole
@@ -142,7 +142,7 @@ def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndar
 def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
     """Return the loop cut at the actuator, over a period.
 
-    It leads from the forces of a period to the controller's answer, with the sign reversed.
+    It leads from the forces of a period to the controller's forces, with the sign reversed.
     """
     steps = [_step(machine, control, 0.0) for control in controls]
     held = np.zeros((len(machine.a), controls[0].a.shape[-1], 1))
@@ -152,10 +152,7 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
 
 
 def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
-    """Return the controller alone over a period, from one measured channel to the forces.
-
-    The channel is STAGE or RATED.
-    """
+    """Return the controller alone over a period, from one measured channel, STAGE or RATED, to the forces."""
     seen = [control.take((measured,), (FORCE,)) for control in controls]
     lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
     direct = np.zeros_like(lifted.d)
@@ -165,7 +162,7 @@ def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifte
 
 
 def unseen(control: System, measured: str) -> System:
-    """Return the controller of which one of its inputs is cut."""
+    """Return the controller with one of its inputs cut."""
     column = control.inputs.index(measured)
     b, d = control.b.copy(), control.d.copy()
     b[..., column] = d[..., column] = 0.0
@@ -186,9 +183,9 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 
 
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
-    """Return how a sample carries the states of plant and controller along.
+    """Return how the states of plant and controller change over a sample.
 
-    `shut` is 1 where the controller's force acts.
+    `shut` is 1 if the controller's force acts.
     """
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))

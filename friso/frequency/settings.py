@@ -1,4 +1,4 @@
-"""Tuning numbers of `friso.frequency`, with the reason for each."""
+"""Settings of `friso.frequency`, with a reason for each."""
 
 from __future__ import annotations
 
@@ -9,196 +9,197 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class FrequencySettings(Settings):
-    """Settings of linear loops, their margins, and describing functions."""
+    """Settings of linear loops, margins, and describing functions."""
 
     shown_beyond: float = setting(5.0, "")
-    """Less hides the slopes beyond crossovers and resonances; more makes the curves between them small."""
+    """Factor by which curves extend beyond crossovers and resonances."""
 
     curve_points: int = setting(1200, "")
-    """Fewer show corners on a screen; more make the page larger."""
+    """Points of a curve. Fewer show corners on a screen; more make the page larger."""
 
     unseen_pole: float = setting(1e-7, "")
-    """A pole below this share of the fastest is a position or its integral, which the velocity loop does not see."""
+    """Largest pole, over the fastest, that is a position or its integral, which the velocity loop does not affect."""
 
     lowest_crossover: float = setting(0.1, "Hz")
-    """Slower loops settle after the moves of any stage here."""
+    """Lowest crossover of the search. Slower loops settle after the moves of any stage."""
 
     highest_crossover: float = setting(1e4, "Hz")
-    """Faster loops are beyond the sampling of any drive here."""
+    """Highest crossover of the search, beyond the sampling of any drive."""
 
     crossover_steps: int = setting(161, "")
-    """Fewer step over a narrow range that is stable; each costs the margins of all limit cases."""
+    """Crossovers of the search. Fewer step over a narrow stable range; each costs the margins of all limit cases."""
 
     search_density: int = setting(60, "1/decade")
-    """Fewer frequencies miss the peak of a resonance between them; the search takes proportionally longer."""
+    """Frequencies per decade of the search. Fewer miss the peak of a resonance."""
 
     search_biases: int = setting(9, "")
-    """Bias forces for each state of the limiter; fewer miss the softest bristle, more cost time alone."""
+    """Bias forces for each state of the limiter. Fewer miss the softest bristle."""
 
     crossover_nudge: float = setting(1e-5, "")
-    """A crossover this share above or below the end of a range is surely beyond it, and no other to the user."""
+    """Relative distance from the end of a range at which a crossover is certainly beyond it."""
 
     logarithm_nudge: float = setting(1e-5, "")
-    """Smaller derivatives drown in the error of the describing function, larger ones in its curvature."""
+    """Change of a logarithm for derivatives. Smaller ones drown in the error of the describing function."""
 
     balance_newton_steps: int = setting(20, "")
-    """A balance that needs more does not converge from that start."""
+    """Newton steps after which a balance does not converge."""
 
     longest_log_step: float = setting(1.0, "")
-    """A longer step of the logarithms jumps to another solution."""
+    """Longest Newton step in the logarithms. A longer one jumps to another solution."""
 
     balance_residual: float = setting(1e-6, "")
-    """The describing functions themselves hold to about this share."""
+    """Relative residual of a solution, the accuracy of the describing functions."""
 
     grid_halvings: int = setting(12, "")
-    """A loop that still turns too far between two frequencies has a resonance without damping."""
+    """Halvings of the grid, after which a resonance has no damping."""
 
     amplitudes_per_decade: int = setting(32, "1/decade")
-    """Fewer step over two roots that lie close together; the time grows in proportion."""
+    """Amplitudes per decade. Fewer step over two roots that lie close together."""
 
     amplitudes_beyond: float = setting(30.0, "")
-    """Roots lie between a stuck and a free cart; this covers laws that creep."""
+    """Factor beyond the amplitudes of a stuck and a free cart within which roots are searched."""
 
     stuck_amplitude: float = setting(1e-3, "")
-    """Below it, in units of the scale of the law's state, the bristles are springs."""
+    """Amplitude below which bristles are springs, in units of the scale of the law's state."""
 
     stateless_amplitude: float = setting(1e-12, "m")
-    """Stands for the scale of a law without a state of its own: far below any motion that matters."""
+    """Amplitude scale of a law without a state of its own, far below any motion that matters."""
 
     free_amplitude: float = setting(10.0, "")
-    """From so many times the amplitude of a cart without friction on, friction no longer counts."""
+    """Amplitude, relative to that of a cart without friction, beyond which friction does not matter."""
 
     most_decades: int = setting(8, "")
-    """Amplitudes that still do not enclose the force belong to a law without bounds."""
+    """Most decades searched. A law that needs more is unbounded."""
 
     force_error: float = setting(1e-10, "")
-    """Roots of the force as exact as the describing function is smooth; looser ones show in curves."""
+    """Relative error of the force at a root. Larger ones show in curves."""
 
     most_root_steps: int = setting(60, "")
-    """Halving alone reaches the error in fewer."""
+    """Most steps to a root; halving alone needs fewer."""
 
     samples_per_harmonic: int = setting(32, "")
-    """Fewer alias the corners of friction into the harmonics that are solved for."""
+    """Intervals per harmonic. Fewer alias the corners of friction into the harmonics."""
 
     least_intervals: int = setting(4096, "")
-    """Fewer miss the instant at which friction reverses, even for a single harmonic."""
+    """Least number of intervals. Fewer miss the instant at which friction reverses."""
 
     series_newton_steps: int = setting(40, "")
-    """A series that needs more does not converge from that start."""
+    """Newton steps after which a series does not converge."""
 
     series_step: float = setting(1e-9, "")
-    """A step of this share of the amplitude is rounding."""
+    """Step relative to the amplitude that is rounding."""
 
     longest_step_share: float = setting(0.5, "")
-    """A longer step jumps to another solution, or to rest."""
+    """Longest step relative to the amplitude. A longer one jumps to another solution, or to rest."""
 
     series_halvings: int = setting(6, "")
-    """A direction that leads away from the solution even then is useless."""
+    """Halvings of a step after which its direction is useless."""
 
     resting_share: float = setting(1e-3, "")
-    """A series this small beside the one before is the rest at the reference."""
+    """Amplitude relative to the previous one below which a series is the rest at the reference."""
 
     gap_tolerances: float = setting(1e3, "")
-    """A state returns to itself within so many relative tolerances of the run."""
+    """Largest gap of a periodic state, in relative tolerances of the run."""
 
     widest_gap: float = setting(1e-4, "")
-    """No looser tolerance of the run allows a larger gap: it shows in the third digit of stiffness."""
+    """Largest gap of a periodic state at any tolerance, which shows in the third digit of stiffness."""
 
     secant_steps: int = setting(12, "")
-    """States that need more repeat themselves only after several periods."""
+    """Secant steps after which states repeat only after several periods."""
 
     least_secant: float = setting(1e-4, "")
-    """Closer points of a secant differ by the error of the runs alone."""
+    """Least distance of the points of a secant. Closer ones differ by errors of the runs."""
 
     most_samples: int = setting(1 << 20, "")
-    """Keeps what is held in memory to tens of megabytes."""
+    """Most samples in memory, tens of megabytes."""
 
     state_newton_steps: int = setting(30, "")
-    """Laws with one state converge in a handful; more means that they do not."""
+    """Newton steps for laws with one state, which converge in a handful."""
 
     state_error: float = setting(1e-12, "")
-    """A change of the state by less is rounding."""
+    """Change of the state that is rounding."""
 
     light_damping: float = setting(0.3, "")
-    """Poles with more damping have no peak that a grid of frequencies could miss."""
+    """Damping ratio below which a pole has a peak that a frequency grid could miss."""
 
     pade_order: int = setting(4, "")
-    """With the phase below, the error of a delay stays under 1e-6; a higher order is ill-conditioned."""
+    """Order of the rational function of a delay. With the phase below, its error stays under 1e-6; a higher order is
+    ill-conditioned."""
 
     pade_phase: float = setting(2.5, "rad")
-    """Phase that one rational function of that order stands for."""
+    """Phase that one rational function of that order covers."""
 
     least_delay_phase: float = setting(5.0, "rad")
-    """Less leaves the poles of a delay too near those of the loop."""
+    """Least phase covered by the rational functions. With less their poles lie too near those of the loop."""
 
     most_delay_phase: float = setting(20.0, "rad")
-    """A loop whose resonance turns farther within its delay is unstable anyway."""
+    """Largest phase of a resonance within the delay. A loop with more is unstable anyway."""
 
     most_delay_sections: int = setting(24, "")
-    """Longer rows make the eigenvalues inaccurate; delays that need them are refused."""
+    """Most rational functions of a delay. More make the eigenvalues inaccurate."""
 
     most_delay_samples: int = setting(64, "")
-    """Longer delays make the state of a sampled drive too large to find its eigenvalues."""
+    """Most samples of a delay. More make the state of a sampled drive too large for eigenvalues."""
 
     members_together: int = setting(256, "")
-    """Arrays of so many members stay in the cache; larger ones are slower."""
+    """Members computed together. Larger arrays leave the processor's cache."""
 
     family_density: int = setting(35, "1/decade")
-    """Fewer miss which member is closest; the exact margin is located afterwards."""
+    """Frequencies per decade for a family. Fewer miss which member is closest; its margin is then computed exactly."""
 
     members_solved_whole: int = setting(16, "")
-    """More at once take memory for all frequencies; fewer gain nothing."""
+    """Members for which all frequencies are solved at once, limited by memory."""
 
     closest_members: int = setting(16, "")
-    """Members looked at exactly; the one with the least margin is among the nearest on the coarse grid."""
+    """Members computed exactly, the nearest to -1 on the coarse grid."""
 
     slowest_speed_share: float = setting(1e-3, "")
-    """Slower than this share of the law's slowest speed the cart is as if stuck."""
+    """Slowest speed over the slowest velocity of the law. A slower cart is as if stuck."""
 
     fastest_speed_factor: float = setting(1e3, "")
-    """Faster than so many times the law's fastest speed only viscous friction is left."""
+    """Fastest speed over the fastest velocity of the law. Beyond it only viscous friction is left."""
 
     slowest_bristle_rate: float = setting(0.1, "1/s")
-    """Bristles that give way more slowly are springs to any loop."""
+    """Slowest rate at which bristles give way. Slower ones are springs to any loop."""
 
     fastest_bristle_rate: float = setting(1e5, "1/s")
-    """Bristles that give way faster leave nothing but viscous friction."""
+    """Fastest rate at which bristles give way. Faster ones leave only viscous friction."""
 
     bristle_length: float = setting(1e-6, "m")
-    """Stands for the bristles of a law without: its force is the same at all speeds."""
+    """Length scale of a law without bristles, whose force does not depend on speed."""
 
     undamped_ratio: float = setting(1e-9, "")
-    """Poles with less damping are on the imaginary axis, but for rounding."""
+    """Damping ratio below which poles are on the imaginary axis, within rounding."""
 
     slow_pole_share: float = setting(1e-6, "")
-    """Sampling and delay do not change poles below this share of their own frequency."""
+    """Relative frequency below which sampling and delay do not change poles."""
 
     margin_density: int = setting(250, "1/decade")
-    """Fewer step over two crossings that lie close together; the time grows in proportion."""
+    """Frequencies per decade for margins. Fewer step over two crossings that lie close together."""
 
     frequencies_beyond: float = setting(100.0, "")
-    """Less misses crossings outside of the poles; beyond it loops only fall."""
+    """Factor beyond the poles up to which crossings are searched; beyond it loops only fall."""
 
     negligible_pole: float = setting(1e-12, "")
-    """A pole below this share of the fastest is 0, but for rounding."""
+    """Pole over the fastest that is 0 within rounding."""
 
     rest_frequency: float = setting(1e-6, "")
-    """At so low a frequency a finite loop no longer changes."""
+    """Frequency, relative to the loop's, at which a finite loop no longer changes."""
 
     real_share: float = setting(1e-9, "")
-    """A smaller imaginary part beside the real one may be rounding."""
+    """Imaginary over real part that may be rounding."""
 
     vanishing_loop: float = setting(1e-8, "")
-    """A smaller loop is nothing but rounding: a mass behind a hold at half the sampling frequency."""
+    """Magnitude of a loop that is only rounding: a mass behind a hold at half the sampling frequency."""
 
     alias_share: float = setting(1e-3, "")
-    """Nearer to the rate of the slowest loop the aliases of rest drown a locus in rounding."""
+    """Distance from the rate of the slowest loop, relative to it, within which rounding spoils a locus."""
 
     jump_share: float = setting(1e-3, "")
-    """A function that keeps more than this share of its values where it changes sign jumps there."""
+    """Remaining value of a function at a sign change, relative to its values, above which it jumps there."""
 
     greatest_bias_share: float = setting(0.999, "")
-    """A stuck stage nearer to break-away has no stiffness left to linearise."""
+    """Largest bias force over the break-away force. A stage nearer to break-away has no stiffness."""
 
     end_precision: float = setting(4e-6, "")
-    """Ends of ranges are then exact in the digits that are shown."""
+    """Relative accuracy of the ends of ranges, beyond the digits that are shown."""

@@ -1,5 +1,4 @@
-"""Springs in series: the joint and the pre-sliding stiffness of the bearing (thesis, Eq. 1), and the formula
-that Table 1 prints for a touched limiter."""
+"""Compute springs in series: joint and bearing before sliding (thesis, Eq. 1), and the touched limiter of Table 1."""
 
 from __future__ import annotations
 
@@ -8,14 +7,14 @@ from typing import Any
 
 
 def in_series(first: Any, second: Any) -> Any:
-    """Stiffness [N/m] of two springs, or damping [N s/m] of two dampers, in series (Eq. 1)."""
+    """Return the stiffness [N/m] of two springs, or the damping [N s/m] of two dampers, in series (Eq. 1)."""
     return first * second / (first + second)
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with its joint replaced by joint and limiter in series, never touching.
+    """Return the stage with its joint replaced by joint and limiter in series, as Table 1 of the thesis prints.
 
-    Stiffness and damping are k1 k2 / (k1 + k2). Table 1 of the thesis gives a limiter in contact in this way.
+    Stiffness and damping are k1 k2 / (k1 + k2), and the limiter never touches.
     """
     pairs = {"stiffness": "limiter_stiffness", "damping": "limiter_damping"}
     free = {"joint.stroke": 1.0}  # however long: it is not touched

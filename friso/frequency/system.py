@@ -1,4 +1,4 @@
-"""Linear systems, many of one kind at once: arrays with the members first."""
+"""Represent many linear systems of one kind at once, as arrays with the members first."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ class System:
     outputs: tuple[str, ...]
 
     def take(self, inputs: Sequence[str], outputs: Sequence[str]) -> System:
-        """Return the system with these inputs and outputs alone, in this order."""
+        """Return the system with the given inputs and outputs only, in this order."""
         columns = [self.inputs.index(name) for name in inputs]
         rows = [self.outputs.index(name) for name in outputs]
         b, c, d = self.b[..., columns], self.c[..., rows, :], self.d[..., rows, :][..., columns]
         return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
 
     def sees(self, name: str) -> bool:
-        """Tell whether anything depends on an input."""
+        """Tell whether any state or output depends on an input."""
         column = self.inputs.index(name)
         return bool(self.b[..., column].any() or self.d[..., column].any())
 

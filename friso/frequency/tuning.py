@@ -1,4 +1,4 @@
-"""Van Dijk's tuning rules (thesis, Eq. 7 and 8) on the mass they are meant for: gains, and the margins they give."""
+"""Apply van Dijk's tuning rules (thesis, Eq. 7 and 8) to the mass they are meant for: gains and margins."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Tuning:
 
     @property
     def true_crossover(self) -> float:
-        """Return where the loop crosses 0 dB [Hz]: somewhat above the crossover it is tuned for."""
+        """Return the frequency [Hz] at which the loop crosses 0 dB, slightly above the tuned crossover."""
         return self.margins.crossovers[-1]
 
 
 EXAMPLE, MOST = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
-"""How it is called, and the largest number of any of its arguments."""
+"""Example call, and the largest number of any of its arguments."""
 
 
 @check_arguments

@@ -1,6 +1,6 @@
-"""Hunting of a stage: the interface of this folder, with `criteria` and `measures` beside it (docs/hunting.md).
+"""Interface of friso.hunting, together with `criteria` and `measures` (docs/hunting.md).
 
-Other floors import from these three alone: what stands behind them may be replaced.
+Other floors import from these three modules only; everything else in this folder may change.
 """
 
 from friso.hunting.attractors import Target

@@ -1,4 +1,4 @@
-"""Find which kicks and which moves of a stage end in hunting."""
+"""Find the kicks and moves of a stage that end in hunting."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from friso.stage.motion import motion_of
 
 @dataclass(frozen=True)
 class Kick:
-    """Kicks of a stage at rest at its reference that start hunting.
+    """Kicks that start hunting of a stage at rest at its reference.
 
-    A kick is a displacement [m], everything displaced and then released as in the motion "release", or a push, a
-    velocity [m/s] of all masses. `windows` are the ranges of kicks that start hunting, their ends known to 1 %. The
-    last may end with the range that was `searched`. `unknown` counts runs that were not completed; they are left out,
-    so a window may reach across them.
+    A kick is a displacement [m] of everything, followed by a release as in the motion "release", or a push, a velocity
+    [m/s] of all masses. `windows` are the ranges of kicks that start hunting, with ends known to 1 %. The last window
+    may end with the range `searched`. `unknown` counts runs that were not completed; they are left out, so a window may
+    reach across them.
     """
 
     windows: tuple[tuple[float, float], ...]
@@ -52,10 +52,10 @@ class Kick:
 
 @dataclass(frozen=True)
 class MoveShare:
-    """The share of moves that end in the cycle.
+    """Fraction of moves that end in hunting.
 
-    `count` moves were drawn evenly over two keys of the motion and run to their end; `hunting` of them hunt. `ranges`
-    [SI] are the ranges of the two keys.
+    `count` moves were drawn evenly over two keys of the motion, with the `ranges` [SI], and run to their end; `hunting`
+    of them hunt.
     """
 
     count: int
@@ -64,26 +64,26 @@ class MoveShare:
 
     @property
     def fraction(self) -> float:
-        """Return the share of completed moves that end in hunting."""
+        """Return the fraction of completed moves that end in hunting."""
         return self.hunting / self.count
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Return the range that holds the true share with a probability of 95 %."""
+        """Return the 95 % interval of the fraction of moves that hunt."""
         return share_interval(self.hunting, self.count)
 
 
 def ends_in(
     flat: Mapping[str, Any], count: int, target: Target, starts: np.ndarray | None = None, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages to see which end in one of their attractors.
+    """Run stages, and find which of them end in one of their attractors.
 
-    The stages are flat keys to SI numbers or arrays (count,). Long after its motion, a run in an attractor still swings
-    by half of the smallest attracting swing or more, peak to peak. Returns which runs end there, which were completed,
-    and how far each swings at the end, peak to peak [m], all of shape (count,).
+    The stages are flat keys to SI numbers or arrays (count,). Long after its motion, a run in an attractor swings by at
+    least half of the smallest attracting swing, peak to peak. Returns which runs end there, which were completed, and
+    the peak-to-peak swing [m] at the end, all of shape (count,).
 
-    `target` is common to all runs, or has one row for each. Where its swings were only observed, half of each other run
-    is inspected, as it may swing less often. `options` are those of `RunOptions`.
+    `target` is common to all runs, or has one row for each. Where its swings were only observed, half of each run is
+    inspected, because it may swing less often. `options` are those of `RunOptions`.
     """
     ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
     observed = np.broadcast_to(target.observed, (count,))
@@ -99,9 +99,9 @@ def ends_in(
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages towards attractors that are closed orbits, as `ends_in` does.
+    """Run stages towards closed orbits, as `ends_in` does.
 
-    Runs are judged early. One that is not caught by then is followed on, twice as long each time.
+    Runs are judged early; a run that has not reached an orbit by then is continued, twice as long each time.
     """
     settings = BasinSettings.current()
     size, lasting, early, last = (
@@ -126,10 +126,7 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages towards swings that were only observed, at a tighter tolerance.
-
-    See `ends_in`.
-    """
+    """Run stages at a tighter tolerance towards swings that were only observed, as `ends_in` does."""
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -142,9 +139,9 @@ def _ends_observed(
 
 
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Return which runs swing as far as an observed attractor, but not in its last period.
+    """Return which runs swing as far as an observed attractor, but not within its last period.
 
-    It is unknown how such runs (see `ends_in`) end.
+    How such runs of `ends_in` end is unknown.
     """
     return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 
@@ -157,10 +154,10 @@ def _last_swing(
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages to the time `end` [s], and measure peak to peak over the time `last` [s].
+    """Run stages to the time `end` [s], and measure peak to peak over the time `last` [s] before it.
 
-    Both have the shape (count,), and the second ends with the first. Returns the swing [m], which runs were completed,
-    and the final states, (count, kept).
+    Both times have the shape (count,). Returns the swing [m], which runs were completed, and the final states, (count,
+    kept).
     """
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))
@@ -184,8 +181,8 @@ def _caught(
     """Return which runs end in an attractor, and for which this is known, both (count,).
 
     The return map decides where it is reliable, long runs elsewhere. A run that swings by more than `widest` at its
-    end, peak to peak [m], may grow or die out, so it counts as unknown. A run that swings less often than an observed
-    attractor is unknown too.
+    end, peak to peak [m], may grow or decay, so its end is unknown. So is that of a run that swings less often than an
+    observed attractor.
     """
     ends, decided = np.zeros(count, bool), np.zeros(count, bool)
     if landing_map is not None:
@@ -214,10 +211,7 @@ def displacements_that_hunt(
 
 
 def displacements_that_run_away(stage: Stage) -> Kick:
-    """Find the displacements after which a stage diverges from its reference.
-
-    The stage has a force limit and no anti-windup.
-    """
+    """Find the displacements after which a stage with a force limit and no anti-windup diverges."""
     flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
@@ -250,9 +244,9 @@ def pushes_that_hunt(
 
 
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """Find the windows of kicks that hunt: search a grid around `unit`, then narrow each edge.
+    """Find the windows of kicks that hunt: search a grid around `unit`, then narrow down each edge.
 
-    `hunts` runs some kicks and returns which of them hunt and which runs were completed.
+    `hunts` runs some kicks; it returns which of them hunt and which runs were completed.
     """
     settings = BasinSettings.current()
     tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)
@@ -278,7 +272,7 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
 def moves_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Estimate the share of moves around the stage's own that end in the `target`.
+    """Estimate the fraction of moves around the stage's own that end in the `target`.
 
     Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
     motions that are no moves, or if every run fails.
@@ -297,7 +291,7 @@ def evenly(count: int) -> np.ndarray:
     """Spread points evenly over the unit square, shape (2, count).
 
     They are the Kronecker sequence of the plastic number; see Roberts 2018, "The unreasonable effectiveness of
-    quasirandom sequences". SciPy's Sobol points would do as well, but take 0.7 s to import.
+    quasirandom sequences". SciPy's Sobol points would do, but take 0.7 s to import.
     """
     plastic = 1.32471795724474602596  # x^3 = x + 1
     return (0.5 + np.outer([1 / plastic, 1 / plastic**2], np.arange(1, count + 1))) % 1.0

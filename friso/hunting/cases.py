@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solver:
-    """A run as the solver saw it: status in words, steps attempted and rejected, tolerance."""
+    """Report of the solver on a run: status in words, steps attempted and rejected, tolerance."""
 
     status: str
     steps: int
@@ -60,22 +60,22 @@ class Solver:
 class Case:
     """A stage and the results of checking it.
 
-    - `judgement`: the verdict and the results it rests on.
+    - `judgement`: the verdict and the results behind it.
     - `peaks`: the thesis's peak count, with peaks at `peak_times` [s] and of `peak_heights` [m] above the reference.
     - `peak_to_peak` [m], `offset` [m] of the middle from the reference, `period` [s] (None: no cycle): of the last
       quarter.
-    - `settling_time`: for each band [m], the time [s] to settle into it wherever the reference stands (None: it does
-      not settle; see `friso.hunting.criteria.settling`); `in_the_end`: at the last of these places alone.
+    - `settling_time`: for each band [m], the time [s] to settle wherever the reference stands (None: it does not
+      settle; see `friso.hunting.criteria.settling`); `in_the_end`: at the last of these places.
     - `largest_force` [N]: of the actuator; `breakaway` [N]: the smallest actuator force, beside constant forces, that
       may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
-    - `force_limit` [N]: the controller's limit, if it keeps the stage off its reference (None: it does not).
+    - `force_limit` [N]: the controller's limit, if it holds the stage off its reference (None: it does not).
     - `unstable`: states in which the loop is unstable regardless of friction (see `friso.hunting.loop`).
-    - `unstable_as_built`: states in which only the drive's samples and delays make it so.
-    - `feeding`: with a backlash, the cause without which hunting ends (None also if this was given up).
+    - `unstable_as_built`: states in which only sampling and delay make it unstable.
+    - `feeding`: with a backlash, the cause without which hunting ends (None also if the search took too much work).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
     - `advice_keeps_friction`: whether the advised bandwidth, a factor beyond the edge of hunting, still does not hunt
       with that factor more or less static friction (None: no such advice, or unknown).
-    - `dwells`: how the stage settles at each place, where its reference stands at more than two.
+    - `dwells`: how the stage settles at each place, if its reference stands at more than two.
     - `tracking`: how it follows a reference that keeps moving (None: one that stands in the end).
     - `trace`: the time response, if asked for.
     """
@@ -105,25 +105,19 @@ class Case:
 
     @property
     def verdict(self) -> Verdict:
-        """Return the verdict: "hunts", "bistable", "transient", "settles" or "failed".
-
-        See `Judgement`. It is "none" while the reference keeps moving.
-        """
+        """Return the verdict of `Judgement`, or "none" for a reference that keeps moving."""
         return self.judgement.verdict
 
     @property
     def runs_away(self) -> bool:
-        """Tell whether the motion diverges because the loop is unstable.
-
-        There is no other verdict then.
-        """
+        """Tell whether the motion diverges because the loop is unstable, so that there is no other verdict."""
         return self.verdict == "failed" and self.judgement.runs_away
 
     @property
     def unmoved(self) -> bool:
         """Tell whether the motion exerts too little force to move the stage.
 
-        A force that rises quickly breaks it away earlier, which a stage shows that settles after a longer motion.
+        A force that rises quickly breaks the stage away earlier; it then settles after a longer motion.
         """
         joint = self.stage.joint
         settles = any(time is not None for time in self.settling_time.values())
@@ -132,11 +126,11 @@ class Case:
 
 
 PART_COUNT = len(PARTS) + 1
-"""Number of parts of a case: those of its verdict, and its margin in static friction."""
+"""Number of parts of a case: the parts of its verdict, and its margin in static friction."""
 
 
 LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
-"""Relative tolerance of runs that only decide how a motion ends; runs that give times are finer."""
+"""Relative tolerance of runs that only show how a motion ends; runs that give times are finer."""
 
 
 def check(
@@ -164,7 +158,7 @@ def check(
     done = Tally(progress, len(different) * PART_COUNT)
 
     def judged(variant: Stage) -> Case:
-        """Check a stage that differs from the others, with its share of the work."""
+        """Check a variant of the stage with its fraction of the work."""
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
         return _case(
@@ -181,7 +175,7 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
 
 
 def _share(stage: Stage) -> float:
-    """Return the share of a check's work for the case with its joint locked, or free."""
+    """Return the fraction of a check's work for the case with its joint locked, or free."""
     settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
     return settings.free_work_share if free else 1 - settings.free_work_share
@@ -270,10 +264,7 @@ def _case(
 
 
 def _fed(stage: Stage, work: float) -> Feeding | None:
-    """Find the cause that feeds the cycle of a stage with a backlash.
-
-    None if that takes too much work.
-    """
+    """Find the cause that feeds the cycle of a stage with a backlash; return None if that takes too much work."""
     try:
         with allowance(work):
             return feeding(stage)
@@ -282,9 +273,9 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 
 
 def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
-    """Return the margin in static friction, and whether the advised bandwidth keeps one.
+    """Return the margin in static friction, and whether the advised bandwidth keeps a margin.
 
-    Each part gets its share of the work and is None if that does not suffice.
+    Each part has an allowance of work and is None if that does not suffice.
     """
     settings = CheckSettings.current()
     with allowance(settings.friction_margin_work_share * work):
@@ -299,10 +290,10 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
-    """Return the force limit [N] that keeps a stage off its reference for ever, or None.
+    """Return the force limit [N] that holds a stage off its reference for ever, or None.
 
-    Either break-away takes more force, `breakaway` [N], or the run ends with the force at the limit. A stage that
-    settles, swings, or may still move gives None.
+    It does if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. A stage
+    that settles, swings, or may still move gives None.
     """
     settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
@@ -319,7 +310,7 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
 def _breakaway(flat: Mapping[str, Any]) -> float:
     """Return the smallest actuator force [N] that may move a sticking stage; 0 without friction.
 
-    Constant forces may help it, and friction may be smaller in one direction.
+    Constant forces may help the actuator, and friction may be smaller in one direction.
     """
     if leading_friction(flat)["friction.model"] == "none":
         return 0.0

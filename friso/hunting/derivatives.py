@@ -1,4 +1,4 @@
-"""Differentiate a cycle, and the edge of hunting, by keys of the stage file."""
+"""Differentiate a limit cycle, and the edge of hunting, by keys of the stage file."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from friso.hunting.settings import EdgeSettings
 
 @dataclass(frozen=True)
 class CycleDerivatives:
-    """The hunting cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
+    """The limit cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
 
-    It is the symmetric cycle, or the cycle over a whole period of a stage that is not symmetric. `attracts` says
+    It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` tells
     whether it is stable; `amplitude` [m] and `period` [s] are its size.
     """
 
@@ -90,7 +90,8 @@ def _extremes(
 ) -> tuple[float, np.ndarray] | None:
     """Return half of peak to peak of the position on an orbit, and its derivatives by the keys.
 
-    `moved` (states, keys) are the derivatives of the orbit's state by the keys. None if a run was not completed.
+    `moved` (states, keys) are the derivatives of the orbit's state by the keys. Returns None if a run was not
+    completed.
     """
     whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
     results = stages.run(orbits.states, whole, rtol, least_swing=0.0)
@@ -110,11 +111,11 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """Return the relative change of the bandwidth at the edge of hunting by key, (keys,).
+    """Return the relative change of the edge of hunting in bandwidth per relative change of each key, (keys,).
 
-    It is per relative change of each key. The edge lies at `factor` times the bandwidth of the stage, everything else
-    unchanged. Along the edge the multiplier keeps its value. Its derivatives are central differences of an exact
-    derivative of the flow. Returns None if no cycle flips there.
+    The edge lies at `factor` times the bandwidth of the stage, everything else unchanged. Along the edge the multiplier
+    keeps its value; its derivatives are central differences of an exact derivative of the flow. Returns None if no
+    cycle flips there.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))
@@ -140,9 +141,9 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """Return the multipliers of stages that differ a little from a given one, (stages,).
+    """Return the multipliers of stages that differ slightly from the stage with the cycle `first`, (stages,).
 
-    The cycle of that stage is `first`. None if an orbit could not be closed, or a multiplier is complex.
+    Returns None if an orbit could not be closed, or a multiplier is complex.
     """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}

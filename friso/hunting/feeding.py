@@ -1,8 +1,7 @@
-"""Find the cause that feeds the hunting of a stage with a backlash:
-dry friction or the backlash.
+"""Find the cause that feeds the hunting of a stage with a backlash: dry friction or the backlash.
 
-Each cause is scaled down to nothing on its own, step by step, and the stage is surveyed anew at every share. So the
-cycle may change its form on the way. Viscous friction stays: it only damps.
+Each cause is scaled down separately, step by step, and the stage is surveyed at every step, because the cycle may
+change its form on the way. Viscous friction stays, because it only damps.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
 class Decline:
     """Decline of hunting as one cause is scaled down.
 
-    `lasts` is the smallest share at which something still attracts. `gone` is the largest share below it at which
-    nothing does. It is None if something attracts down to the last share, and 0 if the cycle shrinks in proportion to
-    its cause. `certain` says whether all surveys were certain.
+    `lasts` is the smallest scale at which the stage still hunts. `gone` is the largest scale below it at which it does
+    not: None if it hunts down to the last scale, and 0 if the cycle shrinks in proportion to its cause. `certain` tells
+    whether all surveys were certain.
     """
 
     lasts: float
@@ -37,23 +36,20 @@ class Decline:
 
     @property
     def needed(self) -> bool:
-        """Tell whether hunting ends without the cause."""
+        """Tell whether hunting ends when the cause is removed."""
         return self.gone is not None
 
 
 @dataclass(frozen=True)
 class Feeding:
-    """How hunting declines without dry friction (None: there is none) or without backlash."""
+    """How hunting declines without dry friction (None: there is no dry friction) and without backlash."""
 
     friction: Decline | None
     backlash: Decline
 
 
 def feeding(stage: Stage) -> Feeding | None:
-    """Find the cause that feeds the hunting of a stage with a backlash.
-
-    None for a stage without backlash.
-    """
+    """Find the cause that feeds the hunting of a stage with a backlash; None for a stage without backlash."""
     flat = stage.flat()
     if not structure(flat).plays:
         return None
@@ -66,7 +62,7 @@ def feeding(stage: Stage) -> Feeding | None:
 def _without_friction(stage: Stage) -> Decline:
     """Return the decline of a stage without dry friction as its backlash vanishes.
 
-    All motions scale with the backlash, so nothing changes until it is gone, and the loop is then linear.
+    All motions scale with the backlash, so nothing changes until it is zero, when the loop is linear.
     """
     settings = CheckSettings.current()
     rests = not unstable(stage.replace({BACKLASH: None}))
@@ -76,7 +72,7 @@ def _without_friction(stage: Stage) -> Decline:
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the keys that scale the dry friction of guide and motor.
 
-    They are the forces, and the stiffnesses, which make bristles softer in proportion.
+    They are the forces, and the stiffnesses, so that bristles become softer in proportion.
     """
     units = {key: field.unit for key, field in declared_keys(flat).items() if key in flat}
     tables = ("friction.", f"{MOTOR_FRICTION}.")
@@ -88,7 +84,7 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
-    """Survey a stage with some keys scaled to all shares, and return how hunting declines."""
+    """Survey a stage with some keys scaled in steps, and return how hunting declines."""
     settings = CheckSettings.current()
     scaled = {**flat, **{key: flat[key] * np.array(settings.feeding_shares) for key in keys}}
     attracted = find_attractors(scaled, len(np.array(settings.feeding_shares)))

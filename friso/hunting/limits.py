@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """Range and steps of a search for hunting, for words that quote them.
+    """Range and steps of a search for hunting, for messages that quote them.
 
     Bandwidths are searched from `lowest_bandwidth` to `highest_bandwidth`, in units of the stage's own. Steps per
-    factor of ten are `steps_to_edge` where an edge is looked for, and `steps_beyond` where something may attract again.
+    factor of ten are `steps_to_edge` where an edge is looked for, and `steps_beyond` where hunting may come back.
     Windows narrower than a step may be missed. Static friction is searched up to `most_friction` times the stage's own,
-    and down to the inverse of this, or to Coulomb friction. Advice keeps away from an edge by the factor
-    `edge_distance`, because machines differ and searches may miss a window. Moves are drawn between `move_shares` of
-    the acceleration, and of the acceleration time, in the stage file.
+    and down to its inverse, or to Coulomb friction. Advice stays `edge_distance`, a factor, away from an edge, because
+    machines differ and searches may miss a window. Moves are drawn between `move_shares` of the acceleration, and of
+    the acceleration time, in the stage file.
     """
 
     lowest_bandwidth: float = 0.25

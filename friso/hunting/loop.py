@@ -1,5 +1,4 @@
-"""Judge the stability of a stage's loop without friction: if it is unstable,
-tuning is to blame, not friction."""
+"""Judge the stability of a stage's loop without friction: if it is unstable, tuning is the cause, not friction."""
 
 from __future__ import annotations
 
@@ -27,16 +26,15 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
 
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
-    """Return the stability of loops for swings far beyond a force limit, words (count,).
+    """Return the stability of loops for swings far beyond a force limit without anti-windup, words (count,).
 
-    There is no anti-windup. Swings grow where the loop is unstable, and shrink where it is stable. Returns None if
-    there is no such limit.
+    Swings grow if the loop is unstable there, and shrink if it is stable. Returns None if there is no such limit.
     """
     return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
 
 def may_run_away(stages: Ensemble) -> np.ndarray:
-    """Tell which stages may run away beyond a force limit without anti-windup, shape (count,).
+    """Tell which stages may diverge beyond a force limit without anti-windup, shape (count,).
 
     Their loop at lower gains is unstable or unknown. All are False without such a limit.
     """
@@ -45,7 +43,7 @@ def may_run_away(stages: Ensemble) -> np.ndarray:
 
 
 def surely_run_away(stages: Ensemble) -> np.ndarray:
-    """Tell which stages surely run away beyond a force limit without anti-windup, shape (count,).
+    """Tell which stages certainly diverge beyond a force limit without anti-windup, shape (count,).
 
     Their loop at lower gains is unstable. All are False without such a limit.
     """
@@ -57,13 +55,12 @@ def surely_run_away(stages: Ensemble) -> np.ndarray:
 def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
-    Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains. The viscous friction is that of the
-    direction with less. The result is "unknown" if the controller does not name the keys of its gain. It is also
-    unknown if the controller acts differently about the reference than far from it, which the linear loop at rest does
-    not show.
+    Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains, with the viscous friction of the
+    direction that has less. The result is "unknown" if the controller does not name the keys of its gain, or acts
+    differently about the reference than far from it, which the linear loop at rest does not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
-    the viscous friction matter for the largest motions. With a mass m and viscous friction b, they shrink if b k_p > m
+    the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m
     k_i and grow if less. This is Hurwitz's criterion for the loop at any gain.
     """
     at_once = CheckSettings.current().loops_at_once
@@ -76,10 +73,7 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Judge the stability at lower gains of stages that fit into memory together.
-
-    Their gain is a known key.
-    """
+    """Judge the stability at lower gains of stages with a known gain key, few enough for the memory."""
     settings = CheckSettings.current()
     shares = np.geomspace(*settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
@@ -104,7 +98,7 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 
 
 def leaves_for_good(stage: Stage) -> bool:
-    """Tell whether a stage that has gone beyond the range of all runs diverges for good.
+    """Tell whether a stage that has left the range of all runs diverges for ever.
 
     It does if the loop is unstable and no force limit with anti-windup can hold it in a larger swing.
     """
@@ -126,11 +120,11 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
 
 @np.errstate(all="ignore")
 def surely_calm(stages: Ensemble) -> np.ndarray:
-    """Return which stages that cannot hunt surely keep up no other swing either, shape (count,).
+    """Return which stages that cannot hunt have no other lasting swing either, shape (count,).
 
     Their loops are stable, also with the limiter of a free joint touched, and beyond a force limit without anti-windup.
-    No backlash opens them and no dither keeps them moving. Without friction, the controller must also act alike near
-    the reference and far from it.
+    They have no backlash and no dither. Without friction, the controller must also act alike near the reference and far
+    from it.
     """
     least_rate = CheckSettings.current().least_growth_rate
     form = stages.structure
@@ -150,7 +144,7 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
 def lags(stages: Ensemble) -> np.ndarray:
     """Return which stages have a controller that lags instead of integrating, shape (count,).
 
-    It pushes ever harder at standstill though it has no integral: below the crossover its force comes behind the
+    At standstill its force keeps growing, although it has no integral: below the crossover the force comes behind the
     error, which feeds a swing. A controller whose force never does so below the crossover only takes energy out.
     """
     at_once, controller = CheckSettings.current().loops_at_once, stages.structure.controller
@@ -164,7 +158,7 @@ def lags(stages: Ensemble) -> np.ndarray:
 
 @np.errstate(all="ignore")
 def _lags(stages: Ensemble) -> np.ndarray:
-    """Tell which controllers without integral lag, of stages few enough for the memory."""
+    """Tell which controllers without integral lag, for stages few enough for the memory."""
     from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
 
     settings, rate = CheckSettings.current(), stages.number("rate")
@@ -178,19 +172,16 @@ def _lags(stages: Ensemble) -> np.ndarray:
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
-    """Return the fastest growth rates [1/s] in each state, (count,).
+    """Return the fastest growth rates [1/s] in each state, (count,); NaN for equations that are not finite.
 
-    NaN where equations are not finite. A limiter may be `touched`.
+    A limiter may be `touched`.
     """
     stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
-    """Return the fastest growth rates [1/s] of linear equations, (count, states, states).
-
-    NaN where they are not finite.
-    """
+    """Return the fastest growth rates [1/s] of linear equations, (count, states, states); NaN if not finite."""
     rates = np.full(len(matrices), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2))
     rates[finite] = np.linalg.eigvals(matrices[finite]).real.max(axis=1)
@@ -198,16 +189,13 @@ def _growth(matrices: np.ndarray) -> np.ndarray:
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
-    """Return the index of the motor's position (0) or velocity (1).
-
-    It is the first state without a transmission.
-    """
+    """Return the index of the motor's position (0) or velocity (1); without a transmission the first state."""
     names = stages.kernel.states
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
-    """Yield each state moved a little from rest, all others at rest, (count, states)."""
+    """Yield the states with one state at a time moved slightly from rest, (count, states)."""
     settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -216,9 +204,9 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
-    """Return the scaled derivatives of the rates at rest by the states.
+    """Return the scaled derivatives of the rates at rest by the states, (count, states, states).
 
-    Their shape is (count, states, states). A limiter that is `touched` is far enough beyond the stroke.
+    A limiter that is `touched` is far enough beyond the stroke.
     """
     settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
@@ -234,9 +222,9 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the linear system of a sliding stage, with only the viscous share of friction.
+    """Return the linear system of a sliding stage with viscous friction only, without states of the friction law.
 
-    `of_directions` combines the shares in the two directions. States of the friction law are left out.
+    `of_directions` combines the viscous friction of the two directions.
     """
     settings = CheckSettings.current()
     kernel, flat = stages.kernel, stages.flat
@@ -266,10 +254,7 @@ def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
 
 
 def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
-    """Return states of stages that have slid for long at a speed [m/s] each.
-
-    Friction is steady then.
-    """
+    """Return states of stages that have slid for long at a speed [m/s] each, so that friction is steady."""
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
     begun = stages.rates(states)[:, bristles]

@@ -1,6 +1,6 @@
 """Find attractors of many stages of one structure at once, and judge the stages.
 
-Stages are flat keys to SI numbers, or to arrays of shape (count,) where they differ. There are fewer starts than in
+Stages are flat keys to SI numbers, or to arrays of shape (count,) where they differ. Fewer starts are used than in
 `friso.hunting.check`, so an attractor with a narrow basin may be missed.
 """
 
@@ -42,12 +42,13 @@ from friso.hunting.what_attracts import surveyed_roughly
 class StageAttractors(ArrayRows):
     """Attractors of many stages that swing for ever, arrays of shape (count,).
 
-    - `attracts`: something that attracts was found.
+    - `attracts`: an attractor was found.
     - `decided`: every simulation that had to decide was completed.
-    - `certain`: moreover, nothing can attract beyond the range searched.
-    - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: nothing attracts).
+    - `certain`: decided, and no attractor can exist beyond the range searched.
+    - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: no attractor).
     - `closed`: the largest swing was closed as an orbit; `multiplier`: of this orbit (NaN: it was not).
-    - `target`: motions that do not come to rest end in this (None: stages of this structure cannot hunt).
+    - `target`: the motion in which all motions end that do not come to rest (None: stages of this structure cannot
+      hunt).
     """
 
     attracts: np.ndarray
@@ -61,7 +62,7 @@ class StageAttractors(ArrayRows):
 
     @classmethod
     def of(cls, survey: Attractors | None, certain: np.ndarray) -> StageAttractors:
-        """Summarise a survey of stages, given which of them are `certain`, shape (count,).
+        """Summarise a survey of stages, given which of them are `certain`, (count,).
 
         A survey of None stands for stages that cannot hunt.
         """
@@ -81,13 +82,13 @@ class StageAttractors(ArrayRows):
 def can_hunt(flat: Mapping[str, Any]) -> bool:
     """Tell whether stages of one structure may hunt.
 
-    They need friction to stick to, integral action that winds up, and a reference that stands still.
+    They need friction, integral action that winds up, and a reference that stands still.
     """
     return not why_not(shared_structure(flat)) and not keeps_moving(flat)
 
 
 def kernels_to_judge(form: Structure) -> set[KernelRequest]:
-    """Return the kernels that verdicts on stages of a structure need, to be built at once."""
+    """Return the kernels that verdicts on stages of a structure need, to be built together."""
     variational = set() if why_not(form) else {KernelRequest(form.standing, variational=True)}
     return {KernelRequest(form), KernelRequest(form.standing), *variational}
 
@@ -101,11 +102,11 @@ def find_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> StageAttractors:
-    """Find one attractor of each stage, for stages of one structure.
+    """Find one attractor of each stage, for stages of one structure, whatever their own motions.
 
-    Their own motions play no part, but stages whose references never stand still cannot hunt. Orbits are closed to the
-    relative tolerance. Without `close_orbits`, only simulations are used, and motions that have converged count as
-    attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is used up.
+    Stages whose references never stand still cannot hunt. Orbits are closed to the relative tolerance. Without
+    `close_orbits`, only simulations are used, and motions that have converged count as attracted. `threads` and
+    `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
@@ -116,11 +117,10 @@ def find_attractors(
 def sketch_attractors(
     flat: Mapping[str, Any], count: int, threads: int | None = None, cancel: np.ndarray | None = None
 ) -> StageAttractors:
-    """Sketch the attractors of stages of one structure, by coarse return maps.
+    """Sketch the attractors of stages of one structure by coarse return maps, and by simulations where these fail.
 
-    Where these do not suffice, simulations follow. A sketch is faster than `find_attractors`, and wrong where an
-    attractor has a narrow basin. `threads` and `cancel` as in `RunOptions`. Raises Exhausted where an allowance is
-    used up.
+    A sketch is faster than `find_attractors`, and may miss an attractor with a narrow basin. `threads` and `cancel` as
+    in `RunOptions`. Raises Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -130,15 +130,16 @@ def sketch_attractors(
 def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
     """Find all attractors of one stage, given as flat keys, as thoroughly as a check does.
 
-    The stage's own motion plays no part. Where an allowance is used up, the attractors found so far are returned.
+    The stage's own motion does not matter. If an allowance of work is used up, the attractors found so far are
+    returned.
     """
     return () if why_not(shared_structure(flat)) else attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return which stages have an unstable loop regardless of friction, (count,).
+    """Return which stages of one structure have an unstable loop regardless of friction, (count,).
 
-    They have one structure; the loop is unstable sticking or sliding.
+    The loop is unstable while the stage sticks, or while it slides.
     """
     states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
     return np.any([*states.values()], axis=0)
@@ -164,7 +165,7 @@ def judge_runs(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Judge stages as `judge_many` does, from motions and attractors found already.
+    """Judge stages as `judge_many` does, from motions and attractors that are already computed.
 
     `rtol` is the relative tolerance of further runs; `threads` and `cancel` as in `RunOptions`.
     """
@@ -199,9 +200,9 @@ def judge_runs(
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Follow motions that do not end in an attractor of their stages.
+    """Continue motions that do not end in an attractor of their stages.
 
-    Returns which of them swing on by less, and which surely swing on or rest, both of shape (motions,).
+    Returns which of them swing on by less, and which certainly swing on or rest, both of shape (motions,).
     """
     rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
     return rest.steady, rest.steady | _stands(flat, rest)

@@ -1,5 +1,4 @@
-"""Find the edge of hunting in bandwidth: the crossover above which nothing that hunts
-attracts the stage."""
+"""Find the edge of hunting in bandwidth: the crossover above which the stage does not hunt."""
 
 from __future__ import annotations
 
@@ -21,18 +20,18 @@ from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
 LOWEST, HIGHEST = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
-"""Bandwidths between which is searched, in units of that of the stage."""
+"""Lowest and highest bandwidth that is searched, in units of the stage's own."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The edge of hunting in bandwidth: below it something attracts, above it nothing does.
+    """The edge of hunting in bandwidth: the stage hunts below it and does not hunt above it.
 
     It is the highest edge in the range searched; windows above it are listed separately. For a stage without an
     attractor it is the nearest edge below. `factor` is the bandwidth at the edge over the stage's own. `crossover` [Hz]
     is the crossover there; None for a controller given by its gains, all of whose poles and zeros the factor scales. At
-    `quiet`, a factor just above, nothing attracts: the edge lies between both. It is `certain` if a closed orbit was
-    followed to its end, or both are close together, and every run that had to decide was completed.
+    `quiet`, a factor just above, the stage does not hunt: the edge lies between both. It is `certain` if a closed orbit
+    was followed to its end, or both are close together, and every run that had to decide was completed.
     """
 
     factor: float
@@ -55,12 +54,12 @@ class Margin:
 class SearchedBandwidths:
     """Result of a search through the bandwidths.
 
-    - `margin`: the edge of hunting (None: there is none).
-    - `windows`: other bandwidths at which something attracts.
-    - `lower`: for a stage with an attractor, the end of attraction below it (None: there is none).
+    - `margin`: the edge of hunting (None: there is no edge).
+    - `windows`: other bandwidths at which the stage hunts.
+    - `lower`: for a stage that hunts, the bandwidth below which it does not (None: there is none).
     - `contradicts`: an orbit was followed to a stage that seemed to have no attractor.
-    - `to_the_top`: something attracts up to the highest bandwidth, so that there is no edge.
-    - `undecided`: no edge was found, but something may attract at some bandwidth.
+    - `to_the_top`: the stage hunts up to the highest bandwidth, so that there is no edge.
+    - `undecided`: no edge was found, but the stage may hunt at some bandwidth.
     """
 
     margin: Margin | None
@@ -76,9 +75,9 @@ NOT_SOUGHT = SearchedBandwidths(None, ())
 
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
-    """Find the edge of hunting of a stage, whose own motion plays no part.
+    """Find the edge of hunting of a stage, whatever its own motion.
 
-    If something is `attracting` the stage it is the last edge above its bandwidth, else the next one below. None if
+    If the stage hunts (`attracting`), it is the last edge above its bandwidth, else the next one below. Returns None if
     there is no edge in the range searched.
     """
     return search_bandwidths(stage, attracting).margin
@@ -87,8 +86,8 @@ def find_margin(stage: Stage, attracting: bool) -> Margin | None:
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
     """Search the bandwidths of `SEARCH_LIMITS` for attractors.
 
-    `survey` is the survey of the stage itself, if there was one. Where an allowance is used up, ends are as known by
-    then, and not certain.
+    `survey` is the survey of the stage itself, if there was one. If an allowance of work is used up, ends are as known
+    by then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
@@ -119,10 +118,7 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 class _Grid:
-    """Factors of the bandwidth, ascending, with the attractors at each.
-
-    All from number `lowest` on were searched.
-    """
+    """Factors of the bandwidth, ascending, with the attractors at each; all from number `lowest` on were searched."""
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
         """Survey the stages at factors from number `first` on. Raises Exhausted."""
@@ -135,7 +131,7 @@ class _Grid:
         self._survey(np.arange(first, len(factors)))
 
     def search_below(self) -> None:
-        """Survey the other factors, whose motions are the slowest, until an allowance is used up."""
+        """Survey the lower factors, whose motions are the slowest, until an allowance of work is used up."""
         try:
             self._survey(np.arange(self.lowest))
         except Exhausted:
@@ -143,10 +139,9 @@ class _Grid:
         self.lowest = 0
 
     def _survey(self, numbers: np.ndarray) -> None:
-        """Sketch the stages at some factors; simulate those whose maps are not resolved.
+        """Sketch the stages at factors given by number; simulate stages whose maps are not resolved.
 
-        Factors are given by number. Those nearest to the stage come first, until a share of the work is used up.
-        Raises Exhausted.
+        Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted.
         """
         settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
@@ -179,10 +174,10 @@ class _Grid:
             self.settled = float(self.factors[index])
 
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
-        """Find the last factor at which something attracts while nothing does at the next.
+        """Find the last factor at which the stage hunts while it does not at the next one.
 
-        The search runs from a number on if `above`, else below it. Returns the number, the end of attraction and
-        whether it is certain. None if there is no such factor.
+        The search starts from a number, upwards if `above`, else downwards. Returns the number, the end of attraction
+        and whether it is certain; None if there is no such factor.
         """
         while True:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
@@ -201,9 +196,9 @@ class _Grid:
             return at, end, bool(end.certain and self.decided[upper].all())
 
     def _proved_at_the_top(self) -> bool:
-        """Tell whether something attracts at the highest factor.
+        """Tell whether the stage hunts at the highest factor.
 
-        If that stays undecided with the allowance used up, the answer is yes.
+        If that is undecided when the allowance is used up, the answer is yes.
         """
         try:
             return self.proved(len(self.factors) - 1, 1)
@@ -212,11 +207,10 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Find the end of attraction between a factor and the next one.
+        """Find the end of attraction between a factor and the next one above (`ahead` 1) or below (-1).
 
-        The next one lies above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of the search,
-        which is then recorded for all factors up to there. Returns None as well if closer inspection shows no
-        attractor. Where the allowance is used up, the end is not certain.
+        Returns None if attraction reaches the end of the search, which is then recorded for all factors up to there, or
+        if closer inspection shows no attractor. If the allowance is used up, the end is not certain.
         """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
@@ -250,15 +244,15 @@ class _Grid:
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Record factors, shape (count,), at which an orbit that was followed past them attracts."""
+        """Record an attractor at the factors, shape (count,), past which a stable orbit was followed."""
         self.passed |= where
         self.attracts |= where
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
-        """Tell whether something attracts at a factor, by number, after trying to close orbits.
+        """Tell whether the stage hunts at a factor, by number, after trying to close orbits.
 
-        If nothing does, the next factors behind it that seemed to have an attractor are inspected too.
+        If it does not, the next factors behind it that seemed to have an attractor are inspected too.
         """
         if at not in self.inspected:
             self._inspect(np.array([at]))
@@ -282,7 +276,8 @@ class _Grid:
     def lower_end(self, index: int) -> AttractionEnd | None:
         """Find the end of attraction below a number.
 
-        None if attraction reaches the end of the search, or if it is not sure that nothing attracts below.
+        Returns None if attraction reaches the end of the search, or if it is not certain that the stage does not hunt
+        below.
         """
         while self.attracts[index] and not self.attracts[self.lowest : index].all():
             first = self.lowest + int(np.flatnonzero(~self.attracts[self.lowest : index])[-1]) + 1
@@ -294,7 +289,7 @@ class _Grid:
         return None
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
-        """Return the windows of factors with an attractor, except that of number `besides`."""
+        """Return the windows of factors with an attractor, except the window of number `besides`."""
         while True:
             before = self.attracts.copy()
             windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)
@@ -309,6 +304,6 @@ class _Grid:
         )
 
     def _spans(self) -> list[tuple[int, int]]:
-        """Return the first and last numbers of runs of neighbouring factors with an attractor."""
+        """Return the first and last numbers of each group of neighbouring factors with an attractor."""
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
         return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

@@ -45,17 +45,18 @@ BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
 
 RESOLVED = DISTINCT / 4
-"""Swings [m] that are skipped when turning points are kept: peaks, periods and outcomes use larger ones."""
+"""Size [m] of swings that are skipped when turning points are stored; peaks, periods and outcomes use larger ones."""
 
 
 @dataclass(frozen=True)
 class Measures:
     """Measures of runs, each of shape (runs,).
 
-    - `peaks`: the thesis's peak count; `distinct_peaks`: of distinct peaks (see `friso.hunting.criteria.peak_count`).
+    - `peaks`: the thesis's peak count; `distinct_peaks`: count of distinct peaks (see
+      `friso.hunting.criteria.peak_count`).
     - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no period).
     - `settling_time` [s]: until the deviation stays within each of `BANDS`, wherever the reference stands;
-      `in_the_end`: at the last of these places alone (NaN: not within the run; see `friso.hunting.criteria.settling`).
+      `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.settling`).
     - `outcome`: words of `friso.hunting.criteria.run_outcome`.
     - `largest_force` [N]: of the actuator.
     - `status`, `steps` attempted and `rejected`: of the solver.
@@ -93,18 +94,12 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
-    """Return the time [s] from which the references of stages stand or move evenly.
-
-    It is 0 for all others.
-    """
+    """Return the time [s] from which the references of stages stand or move at constant speed, or 0."""
     return np.asarray(last_corner(flat)) if ends_evenly(flat) else 0.0
 
 
 def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:
-    """Scan the turning points of a chunk of runs, up to the largest number that a run has.
-
-    Their references stand from the `corner` [s] on.
-    """
+    """Scan the turning points of a chunk of runs whose references stand from the `corner` [s] on."""
     results = runs.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
@@ -112,15 +107,15 @@ def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:
 
 
 def swing_of(runs: Runs) -> np.ndarray:
-    """Return the peak-to-peak deviation [m] over the window at the end of runs, (runs,).
+    """Return the peak-to-peak deviation [m] over the final window of runs, (runs,).
 
-    See `RunOptions`.
+    `RunOptions` defines the window.
     """
     return runs.statistic("deviation_max") - runs.statistic("deviation_min")
 
 
 def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
-    """Describe how a chunk of runs ends, for the "inner" or the "outer" band."""
+    """Return how a chunk of runs ends, for the "inner" or the "outer" band."""
     return End(
         completed=np.equal(runs.results.statuses, Status.DONE),
         swing=swing_of(runs),
@@ -133,10 +128,7 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
 
 
 def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
-    """Measure a chunk of runs of the stages `flat`.
-
-    Arrays in it have one entry per run of the chunk.
-    """
+    """Measure a chunk of runs of the stages `flat`, whose arrays have one entry per run of the chunk."""
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
@@ -220,8 +212,8 @@ class SampledSolver:
 def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:
     """Run a stage's motion and measure it, arrays of shape (1,).
 
-    The turning points of the run itself count, regardless of the sampling interval of a time response. Raises
-    ValueError for a tolerance that is not usable.
+    The turning points of the solver's run count, not those of a sampled response. Raises ValueError for a tolerance
+    that is not usable.
     """
     flat = stage.flat()
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))

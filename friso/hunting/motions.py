@@ -1,5 +1,4 @@
-"""Run and measure the stages' own motions,
-and follow those that do not come to rest for longer."""
+"""Run and measure the motions of stage files, and continue those that have not come to rest."""
 
 from __future__ import annotations
 
@@ -30,9 +29,9 @@ from friso.hunting.turning import HALF, WINDOW
 class Motions(ArrayRows):
     """Results of the stages' own motions, arrays of shape (count,).
 
-    Runs were `completed`, or ran `away` from the reference. `peaks` is the thesis's peak count and `swing` [m] peak to
-    peak of the last quarter. `settling` [s] is the time from the last corner of the reference until the deviation stays
-    within 10 um (NaN: not within the run).
+    Runs were `completed`, or diverged (`away`). `peaks` is the thesis's peak count and `swing` [m] the peak-to-peak
+    deviation of the last quarter. `settling` [s] is the time from the last corner of the reference until the deviation
+    stays within 10 um (NaN: not within the run).
     """
 
     completed: np.ndarray
@@ -67,12 +66,12 @@ class FollowedMotions:
     """Motions of stages without a stable cycle, arrays of shape (count,).
 
     - `rests`: at rest at the end, within 10 um of the reference.
-    - `moving`: not at rest, or still swinging within that.
-    - `after` [s]: time after which it rests when followed for long (NaN: it does not, or unknown).
+    - `moving`: not at rest, or still swinging within 10 um.
+    - `after` [s]: time after which it rests when continued (NaN: it does not, or unknown).
     - `steady`: swings on, neither settling nor decaying.
-    - `followed` [s]: time for which it was followed (NaN: only to its end, or the longer run was not completed).
-    - `swing` [m]: peak to peak of the last quarter of this time.
-    - `away`: diverges from the reference in it.
+    - `followed` [s]: time for which it was continued (NaN: not, or the longer run was not completed).
+    - `swing` [m]: peak to peak of the last quarter of that time.
+    - `away`: diverges from the reference.
     """
 
     rests: np.ndarray
@@ -85,11 +84,11 @@ class FollowedMotions:
 
     @property
     def unknown(self) -> np.ndarray:
-        """Return which motions had to be followed for long but were not to the end, shape (count,)."""
+        """Return which motions had to be continued but did not reach the end, shape (count,)."""
         return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Follow the motions numbered `which`, of the stages `flat`, for long. Raises Exhausted."""
+        """Continue the motions numbered `which`, of the stages `flat`, for a long time. Raises Exhausted."""
         settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
         waits = settings.least_followed_waits * wait(stages, loose_from(stages))
@@ -112,10 +111,9 @@ class FollowedMotions:
 def followed_motions(
     flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool
 ) -> FollowedMotions:
-    """Follow motions that have not come to rest at their end, or still swing there.
+    """Continue motions that have not come to rest at their end, until an allowance of work is used up.
 
-    Motions are followed until an allowance is used up. Where hunting is not `possible`, a stage may also rest off its
-    reference.
+    If hunting is not `possible`, a stage may also rest off its reference.
     """
     rests, still = np.isfinite(motions.settling), np.zeros(count, bool)
     steady, away, followed = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
@@ -134,10 +132,7 @@ def followed_motions(
 
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """Return the peak-to-peak swings [m] up to which stages count as at rest, (count,).
-
-    The stages have one structure.
-    """
+    """Return the peak-to-peak swings [m] up to which stages of one structure count as at rest, (count,)."""
     return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 

@@ -1,7 +1,7 @@
-"""Find the edge of hunting in bandwidth: the factor beyond which nothing attracts a stage.
+"""Find the edge of hunting in bandwidth: the factor beyond which the stage has no attractor.
 
-A closed orbit is followed through the bandwidth to its end: a flip, a fold, or where it is lost. Just beyond this end
-something else may attract. Its orbit is then followed in turn, until nothing attracts. Where no orbit can be followed,
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, or the loss of the orbit. If another
+attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed,
 surveys between the last bandwidth with an attractor and the next one without narrow down the edge.
 """
 
@@ -24,21 +24,21 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 FARTHER = np.array([1.03, 1.06])
-"""Factors beyond the end of an orbit at which attractors are looked for again: windows that no orbit leads to lie there
-most often, and are narrower than the steps of a search through all bandwidths."""
+"""Factors beyond the end of an orbit at which attractors are looked for again. Windows to which no orbit leads lie
+there most often, and are narrower than the steps of a search through all bandwidths."""
 
 
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
-"""Start distances from which a motion is followed to the next bandwidth, as multiples of its own distance."""
+"""Start distances from which a motion is followed to the next bandwidth, as multiples of its sticking distance."""
 
 
 @dataclass(frozen=True)
 class AttractionEnd:
-    """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`.
+    """Two factors of the bandwidth: with an attractor at `inside` and without one at `outside`.
 
-    The end is `certain` if an orbit was followed to its end or its loss at `inside`, or an attractor was seen there.
-    Nothing may attract at `outside`, all runs must have decided, and both factors must be close together. The end lies
-    between both, with the relative error `reserve`.
+    The end is `certain` if an orbit was followed to its end or its loss at `inside`, or an attractor was seen there, no
+    attractor exists at `outside`, all runs decided, and both factors are close together. The end lies between both,
+    with the relative error `reserve`.
     """
 
     inside: float
@@ -53,26 +53,23 @@ class AttractionEnd:
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """A window of bandwidths in which something attracts, by its two ends.
+    """A window of bandwidths in which a stage hunts, by its two ends.
 
-    They are factors of the stage's own; None at the end of the search.
+    The ends are factors of the stage's own bandwidth; None at the end of the search.
     """
 
     low: AttractionEnd | None
     high: AttractionEnd | None
 
     def holds(self, factor: float) -> bool:
-        """Tell whether something attracts at a factor."""
+        """Tell whether the stage hunts at a factor."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
 
 @dataclass
 class _Place:
-    """Progress of a search: motions that attract `at` a factor, and a factor `outside`.
-
-    At the latter nothing seems to attract.
-    """
+    """Progress of a search: motions `at` a factor, and a factor `outside` that seems to have no attractor."""
 
     at: float
     motions: tuple[Swinging, ...]
@@ -87,8 +84,8 @@ class Beyond(Exception):
 class EdgeSearch:
     """A search for an edge of hunting, towards the `farthest` factor of the bandwidth.
 
-    The stage is given as flat keys. Nothing attracts at the factor `settled`, if given: an attractor beyond it belongs
-    to another window.
+    The stage is given as flat keys. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs to
+    another window.
     """
 
     flat: Mapping[str, Any]
@@ -96,10 +93,10 @@ class EdgeSearch:
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """Find the end of attraction: these motions attract at a factor, nothing does at `outside`.
+        """Find the end of attraction, from motions at the factor `at` towards the factor `outside` without any.
 
-        Raises Beyond if something attracts up to the end of the search. Where an allowance is used up, the end is as
-        close as known by then, and not certain; attraction may have been followed past `outside`.
+        Raises Beyond if an attractor exists up to the end of the search. If an allowance of work is used up, the end is
+        as close as known by then, and not certain; attraction may have been followed past `outside`.
         """
         place = _Place(at, motions, outside)
         try:
@@ -127,8 +124,8 @@ class EdgeSearch:
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
         """Look for attractors just beyond the end of an orbit, and farther off.
 
-        Returns the factors that were searched, and the attractors there. Without a map, factors farther off are only
-        searched if a simulation shows an attractor.
+        Returns the searched factors and their attractors. Without a map, factors farther off are searched only if a
+        simulation shows an attractor.
         """
         if farther.size and not has_a_map(self._stages(farther)):
             seen = attractors(self._stages(farther), cycles=False)
@@ -158,8 +155,8 @@ class EdgeSearch:
     def _bracketed(self, place: _Place) -> AttractionEnd:
         """Narrow down the edge by surveys where no orbit can be followed to it.
 
-        The edge lies between the last of several factors with an attractor and the next one. The search repeats between
-        these two until they are close together.
+        Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
+        them until they are close together.
         """
         settings = EdgeSettings.current()
         reach, ahead = settings.reach_log, self._ahead(place.at)
@@ -183,10 +180,7 @@ class EdgeSearch:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
-        """Tell whether something surely attracts at a place.
-
-        It is a closed orbit, or a swing seen by a thorough survey.
-        """
+        """Tell whether the stage certainly hunts at a place, by a closed orbit or a swing of a thorough survey."""
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
@@ -196,8 +190,8 @@ class EdgeSearch:
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
         """Find the attractors at some factors.
 
-        Where maps do not decide, runs also start from `distances` [m], shape (n,). Runs confirm the maps of the
-        factors numbered `confirm`.
+        Where maps do not decide, runs also start from `distances` [m], shape (n,). Runs confirm the maps of the factors
+        numbered `confirm`.
         """
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
@@ -211,16 +205,16 @@ class EdgeSearch:
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
-        """Return the factor `outside` without an attractor, or one further ahead if passed."""
+        """Return the factor `outside` without an attractor, or one further ahead if `at` has passed it."""
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
-        """Follow a closed orbit from a factor to the last one at which it is stable.
+        """Follow a closed orbit from a factor to the last factor at which it is stable.
 
-        Returns this factor and the distance [m] at which the stage sticks there. Raises Beyond if the orbit is stable
-        up to the end of the search.
+        Returns this factor and the sticking distance [m] there. Raises Beyond if the orbit is stable up to the end of
+        the search.
         """
         settings = EdgeSettings.current()
         ahead, cycles = self._ahead(at), orbit.cycles
@@ -250,7 +244,7 @@ class EdgeSearch:
         farthest = start
 
         def over(_: Point, point: Point) -> bool:
-            """Tell whether the orbit has lost stability or turned back; else note the farthest point."""
+            """Tell whether the orbit has lost stability or turned back; if not, store the farthest point."""
             nonlocal farthest
             ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
             farthest = farthest if ended else point
@@ -275,7 +269,7 @@ def _orbit_distance(point: Point, orbit: Swinging) -> float:
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:
-    """Return the factor that comes first on the way up, `ahead` 1, or down, -1."""
+    """Return the factor that comes first in the direction `ahead`: 1 up, -1 down."""
     return float(min(one, other) if ahead > 0 else max(one, other))
 
 

@@ -15,13 +15,13 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
 SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
-"""Values tried first on either side of the stage's own, as shares of the logarithm of the farthest factor. They are
+"""Values tried first on either side of the stage's own, as fractions of the logarithm of the farthest factor. They are
 closest together near the stage's own value, and as many as run at once on most processors."""
 
 
 WITHIN = np.array([2, 4])
-"""Numbers of the values, from the stage's own outward, that are searched thoroughly if a rough survey finds no change:
-9 and 23 % off for a farthest factor of three."""
+"""Numbers of the values, from the stage's own outward, that are searched thoroughly if a rough survey finds no change.
+They are 9 and 23 % off for a farthest factor of three."""
 
 
 class Undecided(Exception):
@@ -29,15 +29,15 @@ class Undecided(Exception):
 
 
 Scaled = Callable[[np.ndarray], Mapping[str, Any]]
-"""Function that returns stages, as flat keys, whose parameter is multiplied by factors, shape (count,)."""
+"""Function that returns stages, as flat keys, with their parameter multiplied by factors (count,)."""
 
 
 @dataclass(frozen=True)
 class MarginEnd:
     """Two factors of a parameter, close together, between which hunting begins or ends.
 
-    From 1 up to `same` the stage hunts or not as it does itself; at `other` it does the opposite. The end is `certain`
-    if a closed orbit attracts at one of both, and a completed search finds no attractor at the other.
+    From 1 up to `same` the stage hunts, or not, as at its own value; at `other` it does the opposite. The end is
+    `certain` if a closed orbit is stable at one of both, and a completed search finds no attractor at the other.
     """
 
     same: float
@@ -47,11 +47,10 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """The range of a parameter within which hunting goes on, or does not begin.
+    """Range of a parameter in which a stage keeps hunting, or does not hunt, as it `attracts` or not.
 
-    Which one depends on whether something `attracts` the stage. `below` and `above` are the nearest factors of the
-    parameter at which that changes (None: at no factor tried up to the end of the `range`). On the `open_sides`, -1 or
-    1, this is not known.
+    `below` and `above` are the nearest factors of the parameter at which that changes (None: at no factor tried up to
+    the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
     """
 
     attracts: bool
@@ -64,7 +63,7 @@ class ParameterMargin:
     def certain(self) -> bool:
         """Tell whether no side is open and both ends, if any, are certain.
 
-        Ranges between the values tried may still differ.
+        Ranges between the tried values may still differ.
         """
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 
@@ -76,9 +75,9 @@ class ParameterMargin:
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
     """Find the margin of a stage in a parameter, from the factor `lowest` to the `highest` one.
 
-    `attracts` says whether something attracts the stage itself. Each side is surveyed roughly, at values that are
-    farther apart the farther off they are, then more closely around a change. Both ends are searched thoroughly. Ranges
-    narrower than these steps may be missed. A side is open if an allowance is used up, or the search does not decide.
+    `attracts` tells whether the stage itself hunts. Each side is surveyed roughly, at values that are farther apart the
+    farther off they are, then more closely around a change. Both ends are searched thoroughly. Ranges narrower than
+    these steps may be missed. A side is open if an allowance of work is used up, or the search does not decide.
     """
     settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
@@ -134,10 +133,7 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """Return the number of the first changed factor, after trying others close to it.
-
-        None if nothing changes.
-        """
+        """Return the number of the first changed factor, after trying others close to it; None if nothing changes."""
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
@@ -154,8 +150,8 @@ class _Side:
     def _pair(self, first: int) -> np.ndarray:
         """Choose the two factors, by number, to search thoroughly around the first changed one.
 
-        They lie as far off it as `proved_distances` says: close to where hunting ends, motions take long to die out,
-        and a rough survey may be wrong. New factors are surveyed roughly.
+        Their distances from it are `proved_distances`: close to the end of hunting, motions take long to decay, and a
+        rough survey may be wrong. New factors are surveyed roughly.
         """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]

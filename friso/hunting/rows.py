@@ -12,8 +12,8 @@ import numpy as np
 class ArrayRows:
     """Base of dataclasses with one row for every stage or run.
 
-    Their arrays, and parts with rows of their own, have these rows. Everything that all rows share, such as numbers
-    and words, stays unchanged.
+    All arrays have these rows, and so have parts with arrays of their own. Numbers and words that all rows share stay
+    unchanged.
     """
 
     def take(self, numbers: Any) -> Self:
@@ -23,7 +23,7 @@ class ArrayRows:
 
 
 def _rows_of(part: Any, numbers: Any) -> Any:
-    """Return rows of an array, or of all arrays that a part holds; anything else unchanged."""
+    """Select rows of an array, or of all arrays in a part; return anything else unchanged."""
     if isinstance(part, np.ndarray):
         return part[numbers]
     if isinstance(part, tuple):

@@ -1,5 +1,4 @@
-"""Find the margins of a stage in values that are uncertain, or that a designer may change:
-static friction and its joint."""
+"""Find the margins of a stage in static friction and in its joint's design."""
 
 from __future__ import annotations
 
@@ -24,8 +23,8 @@ JOINT_KEYS = "joint.stroke", "joint.stiffness"
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
     """Find the margin of a stage in static friction, with its Coulomb friction unchanged.
 
-    The range runs from static friction equal to Coulomb friction up to a multiple given by `SEARCH_LIMITS`. None if a
-    friction law lacks one of both, if the stage cannot hunt, or if its attractors are unknown.
+    The range runs from static friction equal to Coulomb friction up to a multiple given by `SEARCH_LIMITS`. Returns
+    None if the friction law lacks one of both, if the stage cannot hunt, or if its attractors are unknown.
     """
     flat = stage.flat()
     if not static_frictions(flat) or not _is_known(judgement):
@@ -35,10 +34,10 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
-    """Find the margins of a stage with a free joint in the joint's stroke and stiffness.
+    """Return the margins of a stage with a free joint in stroke and stiffness, by key.
 
-    They stand by their keys. The range is given by `SEARCH_LIMITS`. There are none for a stage that cannot hunt, or
-    whose attractors are unknown.
+    The range is given by `SEARCH_LIMITS`. The result is empty for a stage that cannot hunt, or whose attractors are
+    unknown.
     """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
@@ -66,10 +65,10 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether nothing attracts a stage with a faster controller and other friction.
+    """Tell whether a stage with a faster controller does not hunt with more or less static friction.
 
-    The controller is faster by `factor`; static friction is more or less by the factor by which advice keeps away from
-    an edge. None if this takes more than the given work, or is not certain.
+    The controller is faster by `factor`; static friction changes by the factor by which advice keeps away from an edge.
+    Returns None if this takes more than the given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

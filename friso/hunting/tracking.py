@@ -1,4 +1,4 @@
-"""How a stage follows a reference that keeps moving, and how it settles at each place where another one stands."""
+"""Measure how a stage follows a moving reference, and how it settles where the reference stands."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from friso.stage.motion import DURATION, motion_of
 
 @dataclass(frozen=True)
 class Dwell:
-    """A place at which the reference stands: its `number` from 1, position [m], and time [s].
+    """A place at which the reference stands: its `number` from 1, position [m], and duration [s].
 
-    `since` is the time from which it stands. `settling`: for each band [m] the time [s] until the stage stays within
-    it; None: it does not while the reference stands.
+    The reference stands from the time `since` [s]. `settling` has for each band [m] the time [s] until the stage stays
+    within the band; None if it does not while the reference stands.
     """
 
     number: int
@@ -35,16 +35,16 @@ class Dwell:
 
     @property
     def slowness(self) -> float:
-        """Return the time of settling within 10 um [s], infinite where it does not."""
+        """Return the time of settling within 10 um [s], infinite if the stage does not settle."""
         time = self.settling[BAND]
         return np.inf if time is None else time
 
 
 @dataclass(frozen=True)
 class Reversal:
-    """A reversal of the reference: time [s], place [m], and the error [m] until half-way on.
+    """A reversal of the reference: time [s], place [m], and error [m].
 
-    The error is the largest one half-way to the next reversal.
+    The error is the largest one until half-way to the next reversal.
     """
 
     time: float
@@ -54,10 +54,11 @@ class Reversal:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How far a stage is off a reference that keeps moving [m]: at most, and RMS.
+    """Error of a stage that follows a moving reference [m]: largest, and RMS.
 
-    Over a `period` [s] the response has been `closed` as a periodic orbit; else it is over the last quarter of the
-    run. `multiplier`: by how much small deviations from that orbit grow in a period, None if it was not closed.
+    Over a `period` [s] the response has been `closed` as a periodic orbit; otherwise the error is that of the last
+    quarter of the run. `multiplier` is the growth of small deviations from that orbit per period, None if it was not
+    closed.
     """
 
     largest: float
@@ -74,7 +75,7 @@ class Tracking:
 
     @property
     def attracts(self) -> bool:
-        """Tell whether neighbouring motions come to the periodic orbit."""
+        """Tell whether neighbouring motions approach the periodic orbit."""
         return self.multiplier is not None and self.multiplier < 1
 
 
@@ -110,7 +111,7 @@ def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
 def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tuple[Dwell, ...]:
     """Return how a sampled run settles at each place of its reference, the slowest first.
 
-    The deviations [m] are those at the times [s], both of shape (n,).
+    Deviations [m] and times [s] have the shape (n,).
     """
     flat, places = stage.flat(), motion.stands(stage.flat())
     positions = motion.reference(flat, np.array([float(place.corner) for place in places]))
@@ -124,11 +125,10 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
-    """Return how a stage follows a reference that keeps moving.
+    """Return how a stage follows a reference that keeps moving; None if its run was not completed.
 
-    None if its run was not completed. A periodic reference gets the response of the same period, which is closed by
-    Newton's method on the states a period later (with derivatives from runs side by side), from the end of the stage's
-    own motion.
+    For a periodic reference, the response of equal period is closed by Newton's method on the states one period later,
+    from the end of the stage's own motion.
     """
     flat, settings = stage.flat(), TrackingSettings.current()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
@@ -159,7 +159,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
 def _reversals(
     flat: Mapping[str, Any], time: np.ndarray, error: np.ndarray, span: tuple[float, float]
 ) -> tuple[Reversal, ...]:
-    """Return the turning points of a reference in a span of time, each with the error behind it."""
+    """Return the turning points of a reference in a time span, each with the error behind it."""
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
     reversals = []
     for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):
@@ -173,10 +173,7 @@ def _reversals(
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
-    """Return the start of a periodic response, shape (1, kept), and its multiplier.
-
-    Returns None if none could be closed.
-    """
+    """Return the start of a periodic response, shape (1, kept), and its multiplier; None if none could be closed."""
     settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
     scales = columns(shape.module.scales(values), 1)[0]

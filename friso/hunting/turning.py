@@ -14,14 +14,14 @@ COUNTED_ABOVE = 1e-4
 """Height above the reference from which peaks count [m] (thesis, Sec. 3.2.2)."""
 
 SEPARATION = 0.5
-"""Time by which peaks are apart [s] (thesis, Sec. 3.2.2)."""
+"""Shortest time between counted peaks [s] (thesis, Sec. 3.2.2)."""
 
 DISTINCT = 1e-6
-"""Depth [m] of the valleys on both sides of a distinct peak (ours): shallower ripple is noise, of the solver or of an
-encoder, on a stage that stands off its reference."""
+"""Least depth [m] of the valleys on both sides of a distinct peak, friso's choice. Shallower ripple is noise of the
+solver or of an encoder."""
 
 WINDOW, HALF = 0.75, 0.5
-"""Shares of the run after which its last quarter and its last half begin."""
+"""Fractions of the run after which its last quarter and its last half begin."""
 
 
 def clear(kinds, count):
@@ -119,7 +119,7 @@ def mean_period(times, count, kinds, ended):
 
 
 def span(times, values, count, since):
-    """Peak to peak of the turning points from a time on [m]."""
+    """Return the peak-to-peak range [m] of the turning points after a time."""
     low, high = np.inf, -np.inf
     for k in range(count):
         if times[k] >= since:
@@ -128,7 +128,7 @@ def span(times, values, count, since):
 
 
 def last_turn(times, count, kinds):
-    """Time of the last extremum of a zigzag [s], -inf where it has none."""
+    """Return the time of the last extremum of a zigzag [s], -inf without one."""
     last = -np.inf
     for k in range(count):
         if kinds[k] != 0:

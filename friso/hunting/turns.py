@@ -1,4 +1,4 @@
-"""Scan the turning points of many runs: counted peaks, period, and the swing before."""
+"""Scan the turning points of many runs for counted peaks, the period, and the swing over the last half."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from friso.hunting.turning import HALF
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
 _COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
 KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
-"""Kinds of the arguments of `friso.hunting.turning.run`."""
+"""Kinds of the arguments of `friso.hunting.turning.run`, in their order."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Turns:
     """Results from the turning points of runs.
 
     `peaks` and `distinct` mark counted and distinct peaks, shape (runs, room) (see
-    `friso.hunting.criteria.peak_count`). The others have the shape (runs,): the `period` of the swing [s] (NaN: none),
-    the time of the last turn, `turned` [s] (-inf: never), and peak to peak of the last half of the run, `earlier` [m]
-    (see `friso.hunting.criteria.run_outcome`).
+    `friso.hunting.criteria.peak_count`). All others have the shape (runs,): the `period` of the swing [s] (NaN: none),
+    the time of the last turn, `turned` [s] (-inf: never), and the peak-to-peak deviation of the last half of the run,
+    `earlier` [m] (see `friso.hunting.criteria.run_outcome`).
     """
 
     peaks: np.ndarray

@@ -1,5 +1,4 @@
-"""Judge one stage: whether a cycle attracts it,
-and whether its own motion ends in that cycle."""
+"""Judge one stage: whether it has a stable limit cycle, and whether its own motion ends in that cycle."""
 
 from __future__ import annotations
 
@@ -45,7 +44,7 @@ from friso.hunting.what_attracts import resolved_map
 from friso.stage import Stage
 
 MOVING = "the reference never stands still"
-"""Reason why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
+"""Reason why a stage whose reference never stands still does not hunt: it has no place to hunt about."""
 
 
 LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
@@ -59,10 +58,10 @@ STILL_SWINGS = "this motion still swings a little at the end of the longest run,
 UNFOLLOWED = (
     "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"
 )
-"""Reason given when no attractor was found, but the motion was not followed until it rests."""
+"""Reason given when no attractor was found, but the motion was not continued until it rests."""
 
 CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
-"""Multiples of the stage's masses with which its motion is run: no machine is known as exactly."""
+"""Multiples of the stage's masses with which its motion is run, because no mass is known that exactly."""
 
 
 RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
@@ -76,11 +75,11 @@ UNCHECKED = "runs with hardly different masses, which show whether chance decide
 
 
 class CheckPart(StrEnum):
-    """A part of a check, reported as it begins, and named if it is given up.
+    """A part of a check, reported as it begins, and by name if it runs out of work (`Judgement.given_up`).
 
-    It is given up for lack of work (`Judgement.given_up`). The first three are computed in this order; `STARTS` is
-    left out without an attractor. `LOWER_BANDWIDTHS` replaces `BANDWIDTHS` if something attracts up to the highest
-    bandwidth. `FRICTION` comes after these, and `FEEDING` for a hunting stage with a backlash.
+    The first three are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS` replaces
+    `BANDWIDTHS` if the stage hunts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING` for a
+    hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -103,21 +102,21 @@ _PROGRESS_WORDS = {
 
 
 PARTS = CheckPart.ATTRACTION, CheckPart.STARTS, CheckPart.BANDWIDTHS
-"""Parts that are computed for a verdict, in this order."""
+"""Parts of a check from which the verdict is computed, in order."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict (see `friso.hunting.criteria.stage_verdict`) and the results it rests on.
+    """The verdict (see `friso.hunting.criteria.stage_verdict`) and the results behind it.
 
-    - `displacement`, `push`, `moves`: starts of hunting, if a cycle attracts.
-    - `margin`: edge of hunting in bandwidth; `windows`: other bandwidths at which something attracts.
-    - `lower`: end of attraction below the bandwidth of a stage that hunts (None: none was found).
+    - `displacement`, `push`, `moves`: starts of hunting, for a stage that has a stable cycle.
+    - `margin`: edge of hunting in bandwidth; `windows`: other bandwidths at which the stage hunts.
+    - `lower`: for a stage that hunts, the bandwidth below which it does not (None: none was found).
     - `settled_after` [s]: time after the last corner of the reference from which the motion stays within 10 um.
-    - `followed` [s]: time for which the motion was followed (None: only to its own end, as the longer run was not
+    - `followed` [s]: time for which the motion was continued (None: only to its own end, as the longer run was not
       needed or not completed).
     - `observed`: the attractor was seen in long simulations only, not closed as an orbit.
-    - `lasting` [m]: peak to peak of a swing seen in this motion alone, when it was followed to the end.
+    - `lasting` [m]: peak-to-peak swing of this motion if it is no known attractor but lasts to the end.
     - `runs_away`: the motion diverges from its reference.
     - `given_up`: parts that would have taken more work than was allowed.
     """
@@ -160,8 +159,8 @@ def judge(
     """Judge a stage whose motion was run and measured at a relative tolerance.
 
     `begin` is called as each part begins (see `CheckPart`). `tell` is called with the verdict as soon as it is certain.
-    Kicks and other bandwidths follow, and a cycle followed here from another bandwidth may still contradict it.
-    Anything that so much `work` does not settle (see `friso.engine.allowance`) is not certain.
+    Kicks and other bandwidths follow, and a cycle followed from another bandwidth may still contradict the verdict.
+    Anything that so much `work` does not decide (see `friso.engine.allowance`) is not certain.
     """
     settings = CheckSettings.current()
     work = settings.check_work if work is None else work
@@ -190,10 +189,7 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage without an attractor.
-
-    It says whether its own motion comes to rest, and where hunting begins.
-    """
+    """Judge a stage without an attractor: whether its own motion comes to rest, and at which bandwidths it hunts."""
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -245,10 +241,7 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage with an attractor.
-
-    It says whether its own motion ends in it, and which starts cause hunting.
-    """
+    """Judge a stage with an attractor: whether its own motion ends in it, and which starts cause hunting."""
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)
@@ -284,8 +277,8 @@ def _with_a_target(
 class OwnMotion:
     """End of a stage's own motion.
 
-    It `ends` in the attractor or not, its run was `completed`, and `swing` [m] is its final swing, peak to peak.
-    `doubt` is the reason why this is uncertain, "" if it is not: a tiny change of mass may change the end.
+    It `ends` in the attractor or not, its run was `completed`, and `swing` [m] is its final peak-to-peak swing. `doubt`
+    is the reason why this is uncertain, "" for none: a tiny change of mass may change the end.
     """
 
     ends: bool
@@ -295,10 +288,10 @@ class OwnMotion:
 
 
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
-    """Run the stage's own motion, also with slightly different masses, and see how it ends.
+    """Run the stage's own motion, also with slightly different masses, and find how it ends (see `ends_in`).
 
-    See `ends_in`. A motion that still swings, but less far or less often than the attractor, may be dying out. It is
-    followed for longer if the given work suffices.
+    A motion that still swings, but less far or less often than the attractor, may be decaying. It is continued if the
+    given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()
@@ -336,7 +329,7 @@ def _starts(
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
     """Find the kicks and moves that start hunting, within some work.
 
-    Also returns the part that was given up.
+    Also returns the part that ran out of work.
     """
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
@@ -358,9 +351,9 @@ def _starts(
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
-    """Return why a motion outside the known attractor need not come to rest; "" if it does.
+    """Return why a motion outside the known attractor may not come to rest; "" if it does.
 
-    `swing` [m] is its final swing, peak to peak; `within` [s] the time from which on it stays near its reference (NaN:
+    `swing` [m] is its final peak-to-peak swing; `within` [s] the time from which on it stays near its reference (NaN:
     not within its run).
     """
     if swing > resting(stage.flat())[0]:
@@ -371,17 +364,14 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
-    """Tell whether runs were lost while no kick, or no move, was seen to start hunting."""
+    """Tell whether runs failed while no kick, or no move, was seen to start hunting."""
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
     return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """Search the bandwidths within some work.
-
-    Returns the result and the part that was given up.
-    """
+    """Search the bandwidths within some work; return the result and the part that ran out of work."""
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
@@ -390,9 +380,9 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """Make the ends found by a search no more certain than the verdict.
+    """Limit the certainty of a search's ends to that of the verdict.
 
-    They are uncertain where the stage may diverge.
+    Ends are uncertain where the stage may diverge.
     """
 
     def sure(end: AttractionEnd) -> bool:

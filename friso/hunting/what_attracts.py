@@ -38,13 +38,13 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 def what_attracts(
     stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
-    """Find the attractors of stages that may hunt: closed orbits, by maps where resolved.
+    """Find the attractors of stages that may hunt, as closed orbits; by return maps where these are resolved.
 
-    A map shows that nothing attracts under three conditions. No cycle that Newton's method closes from the map of
-    stages at rest is stable. No unstable cycle, from there or from the map itself, has a lasting motion beside it. For
-    the stages numbered `confirm`, runs land where the map predicts. All other stages are searched from many starts:
-    beside these cycles and motions, and from `distances` [m], shape (count, n). Orbits are closed to a relative
-    tolerance. Raises Exhausted where an allowance is used up.
+    A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
+    stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
+    runs land where the map predicts. All other stages are searched from many starts, beside these cycles and motions,
+    and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance. Raises Exhausted if an
+    allowance of work is used up.
     """
     if not has_a_map(stages):
         return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
@@ -68,10 +68,9 @@ def what_attracts(
 
 @dataclass(frozen=True)
 class _Cycles(ArrayRows):
-    """Cycles closed from the maps of stages at rest, and lasting motions beside them.
+    """Cycles closed by Newton's method from the maps of stages at rest, and lasting motions beside them.
 
-    Newton's method closes them. `held` [m], shape (count, n), are sticking distances of motions beside unstable
-    cycles, NaN for none.
+    `held` [m], shape (count, n), are sticking distances of motions beside unstable cycles, NaN for none.
     """
 
     families: tuple[Cycles, ...]
@@ -99,10 +98,7 @@ class _Cycles(ArrayRows):
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Return which stages have a stable cycle, or a lasting motion beside an unstable one.
-
-        Shape (count,).
-        """
+        """Return which stages have a stable cycle, or a lasting motion beside an unstable one, (count,)."""
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
 
 
@@ -116,10 +112,7 @@ def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycle
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """Return the return map of one stage if its attractors are exactly the given `motions`.
-
-    None if they are not.
-    """
+    """Return the return map of one stage if its attractors are exactly the given `motions`, else None."""
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)
@@ -136,7 +129,7 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 class Sketch:
     """Result of coarse return maps of stages, arrays of shape (count,).
 
-    Something seems to attract a stage, `attracts`, and this is `decided`.
+    `attracts` tells whether a stage seems to have an attractor, `decided` whether the map decides that.
     """
 
     attracts: np.ndarray
@@ -147,8 +140,8 @@ class Sketch:
 def sketched(stages: Ensemble) -> Sketch:
     """Sketch the return maps of stages that may hunt, without closing orbits.
 
-    An attractor with a narrow basin is missed. Stages without a map stay undecided. Raises Exhausted where an allowance
-    is used up.
+    An attractor with a narrow basin is missed. Stages without a map stay undecided. Raises Exhausted if an allowance of
+    work is used up.
     """
     mapped, decided = _sketch(stages)
     if mapped is None:
@@ -168,10 +161,10 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
 def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -> Attractors:
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
-    It is many times faster than `what_attracts`, and wrong where an attractor has a narrow basin. A sketch of the maps
+    This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A sketch of the maps
     decides. If its attractor is weak, or landings wander, the cycles that Newton's method closes from the map at rest
-    decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted where an
-    allowance is used up.
+    decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if an
+    allowance of work is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []
@@ -194,7 +187,7 @@ def _hardly_attracts(landing_map: LandingMap) -> bool:
     """Tell whether a coarse map has no attractor that can be trusted.
 
     A trusted one is simple, strongly stable, and reached from enough points. Where the next landing is about as far off
-    as the last, straight pieces between points lead to long cycles that the stage does not have.
+    as the last, straight pieces between points create long cycles that the stage does not have.
     """
     settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
@@ -226,9 +219,9 @@ _SEARCHES_ALONE = ContextVar("searches alone", default=False)
 
 @contextmanager
 def search_alone() -> Iterator[None]:
-    """Search from many starts within the block, without return maps.
+    """Switch return maps off within the block, so that stages are searched from many starts.
 
-    Comparing both shows whether maps are right.
+    Comparing both results shows whether maps are right.
     """
     token = _SEARCHES_ALONE.set(True)
     try:
@@ -240,9 +233,9 @@ def search_alone() -> Iterator[None]:
 def has_a_map(stages: Ensemble) -> bool:
     """Tell whether the sticking distance of stages may decide everything that follows.
 
-    It does not if a joint swings freely while the cart sticks, or a limiter chatters. A force limit without anti-windup
-    lets swings grow without bound. Integrals of several loops wind up on their own. Within a dead band or a backlash a
-    stage may stand anywhere.
+    It does not if a joint swings freely while the cart sticks, a limiter chatters, a force limit without anti-windup
+    lets swings grow, integrals of several loops wind up separately, or the stage may stand anywhere within a dead band
+    or a backlash.
     """
     if _SEARCHES_ALONE.get():
         return False

@@ -1,1 +1,1 @@
-"""From measured logs to a stage: reading, frequency responses, parameters in time, fits of the whole model."""
+"""Identify a stage from measured logs: reading, frequency responses, experiments, fits of the whole model."""

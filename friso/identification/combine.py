@@ -1,4 +1,4 @@
-"""One estimate of a quantity from several, and how the combined ones hang together."""
+"""Combine several estimates of a quantity into one, with the correlations of the combined values."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
-"""What one experiment shows, each with an interval, and its correlation matrix, shape (estimates, estimates)."""
+"""The determined estimates of one experiment, with their correlation matrix, shape (estimates, estimates)."""
 
 
 def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
-    """Combine all estimates into one per key, and say in sentences where they disagree.
+    """Combine all estimates into one per key, and list disagreements in sentences.
 
-    Estimates are weighted by their intervals; where some disagree, the interval allows for that. What one experiment
-    shows counts, whatever another cannot show; where none does, what all of them leave possible is left.
+    Estimates are weighted by their intervals; if some disagree, the interval is widened. An experiment that determines
+    a key overrides those that cannot. If none determines it, the range that all leave possible remains.
     """
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):
@@ -71,22 +71,22 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
 
 
 def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """List the estimates that are shown: those have an interval, by which they can be weighted."""
+    """List the determined estimates, which have an interval to weight them by."""
     return [estimate for estimate in estimates if estimate.determined]
 
 
 def _weight(estimate: Estimate) -> float:
-    """The weight of an estimate: one over its variance."""
+    """Return the weight of an estimate: one over its variance."""
     return (COVERAGE / estimate.half_width) ** 2
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the weighted mean of estimates of one key, and whether a test finds they agree.
+    """Return the weighted mean of estimates of one key, and whether they agree by a chi-square test.
 
-    The test is chi-square. If they scatter more than their own intervals say, the interval is wider by the Birge ratio
-    (Birge 1932, doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average
-    out. If the estimates do not agree, as friction at several places, each gets an additional scatter from place to
-    place (`_between`); for two, which hardly show a scatter, the interval spans both.
+    If they scatter more than their own intervals allow, the interval is wider by the Birge ratio (Birge 1932,
+    doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average out. If the
+    estimates do not agree, as friction at several places, each gets an additional scatter (`_between`); for two, which
+    hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column)
@@ -112,9 +112,9 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     """Return the mean of values, shape (n,), that scatter by more than their variances.
 
-    A variance between the values is added, just large enough to explain their scatter (Paule, Mandel 1982,
-    doi:10.6028/jres.087.022). The degrees of freedom are those of the number of values that count equally: a value
-    that is hardly known says little about the scatter.
+    A common variance is added, just large enough to explain the scatter (Paule, Mandel 1982, doi:10.6028/jres.087.022).
+    The degrees of freedom are those of the number of values with equal weight, because an uncertain value says little
+    about the scatter.
     """
 
     def excess(added: float) -> float:
@@ -127,10 +127,7 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
 
 def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the range that estimates without a value have in common, and whether there is one.
-
-    If they have none in common, return the range that spans all of them.
-    """
+    """Return the common range of estimates without a value, and whether there is one; else the range that spans all."""
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
     ] or estimates[:1]
@@ -144,7 +141,7 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
 
 def _reasons(reasons: Sequence[str]) -> str:
-    """Join reasons; where some differ in numbers alone, name the first and count the others."""
+    """Join reasons; of reasons that differ only in numbers, name the first and count the others."""
     alike: dict[str, list[str]] = {}
     for reason in dict.fromkeys(reasons):
         alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", reason), []).append(reason)
@@ -153,19 +150,19 @@ def _reasons(reasons: Sequence[str]) -> str:
 
 
 def _text(estimate: Estimate) -> str:
-    """An estimate in words, with its method."""
+    """Return an estimate in words, with its method."""
     return f"{_value(estimate)} by {estimate.method}"
 
 
 def _texts(estimates: Sequence[Estimate]) -> str:
-    """Several estimates in words, the values by method."""
+    """Return several estimates in words, with their methods."""
     methods = dict.fromkeys(estimate.method for estimate in estimates)
     values_of = ([_value(estimate) for estimate in estimates if estimate.method == method] for method in methods)
     return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, values_of, strict=True))
 
 
 def _value(estimate: Estimate) -> str:
-    """The value with its interval in words, or the range that is left."""
+    """Return the value with its interval in words, or the remaining range."""
     if estimate.determined:
         return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g})"
     return f"{estimate.low:.4g} to {estimate.high:.4g} is the possible range"

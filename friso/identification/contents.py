@@ -1,4 +1,4 @@
-"""What a file of logs holds, without identifying anything: channels, proposed roles and why, and what is still open."""
+"""Describe the contents of a log file: channels, proposed roles with reasons, and open questions."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from friso.identification.sources import log_with_signals, unnamed
 
 @dataclass(frozen=True)
 class ChannelContent:
-    """A channel as it stands in a file.
+    """A channel of a file.
 
-    Its `values`, shape (n,), are in its `unit` ("" for none), at the instants `time` [s], shape (n,), or None. Its
-    `role` ("" for none) has a reason.
+    Its `values`, shape (n,), are in its `unit` ("" for none), at the instants `time` [s], shape (n,), or None. `role`
+    ("" for none) has a reason.
     """
 
     name: str
@@ -40,18 +40,18 @@ class ChannelContent:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """The least and the greatest number; None without any."""
+        """Return the least and the greatest number; None without any."""
         finite = self.values[np.isfinite(self.values)]
         return (float(finite.min()), float(finite.max())) if finite.size else None
 
     @property
     def missing(self) -> int:
-        """How many samples are no numbers."""
+        """Return how many samples are not numbers."""
         return int(np.count_nonzero(~np.isfinite(self.values)))
 
     @property
     def sample_rate(self) -> float | None:
-        """The usual rate [Hz] of the samples; None without instants that increase."""
+        """Return the usual sampling rate [Hz]; None without increasing instants."""
         steps = np.diff(self.time) if self.time is not None else np.empty(0)
         steps = steps[steps > 0]
         return 1 / usual_step(steps) if steps.size else None
@@ -67,11 +67,11 @@ class ChannelContent:
 
 @dataclass(frozen=True)
 class LogContent:
-    """What a file holds, for a look at it before anything is identified.
+    """Contents of a log file, before anything is identified.
 
     It has the title of its format, its channels or its frequency response, and the kind of experiment with the reason
-    ("" where it is open). `read` are lines that tell of the reading, `gaps` what has to be told before the file can be
-    identified, and `options` those with which it was read.
+    ("" if open). `read` are lines about the reading, `gaps` what the user must state before identification, and
+    `options` the ones used for reading.
     """
 
     path: Path
@@ -87,14 +87,14 @@ class LogContent:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """The lines of `read` that tell what of the file is not there."""
+        """Return the lines of `read` about lost parts of the file."""
         return tuple(line for line in self.read if line.startswith("left out") or " ends early: " in line)
 
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
-    """Read what a file holds, mapped as the options say or as kept beside it or in `folder`.
+    """Read the contents of a file, mapped by the options or by a mapping stored beside it or in `folder`.
 
-    Raises LogError for what cannot be read.
+    Raises LogError for a file that cannot be read.
     """
     name = file_format(path)
     title = FORMATS[name].title
@@ -121,7 +121,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
     """Return the log as it would be identified, its kind, and the reason for that kind.
 
-    Raises LogError, and GapsError for what the log does not say.
+    Raises LogError, and GapsError for missing information.
     """
     if mapping.experiment is not None:
         return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"
@@ -144,7 +144,7 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
 
 
 def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:
-    """Return the sampling instants of a channel [s]; None if neither file nor mapping has them."""
+    """Return the sampling instants of a channel [s]; None if neither file nor mapping has any."""
     clock = proposal.chosen.get("time")
     try:
         return instants(AssignedRole("", channel, "", False), clock, reading, Notes())

@@ -1,9 +1,9 @@
-"""What a doubt is: one effect that may be in a log and is not in the model, with the test that notices it.
+"""Define doubts: effects that may be in a log and are not in the model, with the test that detects each.
 
-Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`, found by its name. It says what it looks
-at, at which moment of an analysis, and what measurement would decide it; its `find` yields findings. A finding is the
-cause in words, with its size, and its consequence: intervals that widen, or values that are refused. The analysis
-applies consequences here, in one place, so that one more effect is one more file.
+Each doubt is a file of `friso/identification/doubts/` that declares `DOUBT`. It states what it looks at, at which
+moment of an analysis, and which measurement would decide it; its `find` yields findings. A finding is the cause in
+words, with its size and its consequence: wider intervals, or values that are not reported. The analysis applies
+consequences in this module, so that one more effect is one more file.
 """
 
 from __future__ import annotations
@@ -30,26 +30,22 @@ if TYPE_CHECKING:
     from friso.identification.quality import Quality
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
-"""When an analysis asks a doubt, and so what `find` is given:
+"""Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
 
-- record: a `RecordCase`, of any log of moves, before anything is said of the fit;
-- fault: a `RecordCase`, where a mass with friction does not describe the log: what is wrong with the log itself;
-- cause: a `RecordCase`, at the same time: effects that would explain what is left unexplained;
-- otherwise: a `RecordCase`, where no such effect explains it;
-- value: a `ValueCase`, what the inverse model's values say of themselves;
-- fit: a `FitCase`, each in turn, with the fit as those before left it;
-- curve: a `KeyCase`, whether fitted parameters are to be believed;
-- key: a `KeyCase`, each in turn, with the estimates as those before left them;
-- response: a `Bench`, the analysis of a frequency response;
-- stage: the identified stage with all estimates; laws: the compared friction laws with that stage.
-"""
+- record: a `RecordCase`, of any log of moves, before the fit; - fault: a `RecordCase`, where a mass with friction does
+  not describe the log: faults of the log; - cause: a `RecordCase`, at that time: effects that would explain the
+  residual; - otherwise: a `RecordCase`, where no such effect explains it; - value: a `ValueCase`, the plausibility of
+  the inverse model's values; - fit: a `FitCase`, each in turn, with the fit as changed by earlier doubts; - curve: a
+  `KeyCase`, whether fitted parameters can be trusted; - key: a `KeyCase`, each in turn, with the estimates as changed
+  by earlier doubts; - response: a `Bench`, the analysis of a frequency response; - stage: the identified stage with all
+  estimates; laws: the compared friction laws with that stage."""
 
 
 @dataclass(frozen=True)
 class RecordCase:
     """A log of moves with its inverse model.
 
-    `cart_share` is the share of the mass that moves with a measured cart.
+    `cart_share` is the fraction of the mass that moves with a measured cart.
     """
 
     log: Log
@@ -58,13 +54,13 @@ class RecordCase:
 
     @property
     def unit(self) -> str:
-        """The unit of the force."""
+        """Return the unit of the force."""
         return self.log.unit("force")
 
 
 @dataclass(frozen=True)
 class ValueCase(RecordCase):
-    """A log of moves, with judgements of its inverse model.
+    """A log of moves with checks of its inverse model.
 
     The model `lacks` something, or the record is `poor`.
     """
@@ -77,8 +73,9 @@ class ValueCase(RecordCase):
 class TriedForces:
     """Forces [N] of an effect that the model leaves out, each of shape (n,) and of size 1.
 
-    `units` are the small sizes at which they are tried, and `label` tells several hypotheses of one effect apart, as
-    the width of a play [m]. `searched` is among how many hypotheses this one was chosen: chance explains more then.
+    `units` are the small sizes at which they are tried. `label` distinguishes hypotheses of one effect, such as the
+    width of a play [m]. `searched` is the number of hypotheses from which this one was chosen, because chance explains
+    more of many.
     """
 
     forces: Sequence[np.ndarray]
@@ -91,7 +88,7 @@ class TriedForces:
 class FittedCase(RecordCase):
     """A log of moves with the fit of the whole model.
 
-    `flat` is the stage as given; `velocity` [m/s], shape (n,), is smoothed over the part of the log that is fitted.
+    `flat` is the stage before the fit; `velocity` [m/s], shape (n,), is smoothed over the fitted part of the log.
     """
 
     flat: Mapping[str, Any]
@@ -103,7 +100,7 @@ class FittedCase(RecordCase):
 class FitCase(FittedCase):
     """A log of moves with its fit, and the quality of the fit.
 
-    `leading` is the effect that explains most of what the fit leaves, among all doubts that try forces.
+    `leading` is the effect that explains most of the residual, among all doubts that try forces.
     """
 
     quality: Quality
@@ -113,7 +110,7 @@ class FitCase(FittedCase):
 
     @property
     def has_cause(self) -> bool:
-        """Whether a cause of what is left unexplained is named already: it may imitate others."""
+        """Tell whether a cause of the residual is already named; it may imitate others."""
         explaining = any(finding.explains for finding in self.quality.findings)
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
@@ -135,7 +132,7 @@ class FitCase(FittedCase):
 
 @dataclass(frozen=True)
 class LeadingEffect:
-    """The effect whose forces explain most of what a fit leaves, by the name of its doubt."""
+    """The effect whose forces explain most of the residual of a fit, by the name of its doubt."""
 
     doubt: str
     tried: TriedForces
@@ -153,11 +150,11 @@ class KeyCase(FitCase):
 
     @property
     def determined(self) -> dict[str, Estimate]:
-        """The estimates that are determined, by key."""
+        """Return the determined estimates, by key."""
         return {estimate.name: estimate for estimate in self.estimates if estimate.determined}
 
     def with_answers(self, finding: RaisedDoubt) -> KeyCase:
-        """Return the case with estimates replaced by a finding's answers, or withheld."""
+        """Return the case with estimates replaced by a finding's answers, or removed."""
         answers = {**finding.answers, **refused(self.estimates, finding.refuses)}
         estimates = tuple(answers.get(estimate.name, estimate) for estimate in self.estimates)
         pairs = zip(self.estimates, estimates, strict=True)
@@ -167,13 +164,13 @@ class KeyCase(FitCase):
 
 @dataclass(frozen=True)
 class RaisedDoubt:
-    """A doubt that was raised: its cause in `words` ("" if estimates say it), and its `size`.
+    """A doubt with a finding: its cause in `words` ("" if estimates state it), and its `size` with a `unit`.
 
-    `size` has a `unit`. Consequences: intervals reach to the values of the inverse model `without` the effect, and to
-    the ends `reaches` by quantity of the inverse model; `fit` and `inverse` have intervals that allow for the effect;
-    `answers` replace estimates of the same key; `refuses` names keys that are withheld, with the reason; and a doubt
-    that `spoils` the record can pass for friction at low speed. One that `explains` what a fit leaves keeps others
-    that would explain it too from being named. `doubt` is the name of the file that raised it.
+    Consequences: intervals reach to the values of the inverse model `without` the effect, and to the ends `reaches` by
+    quantity of the inverse model; `fit` and `inverse` have intervals that allow for the effect; `answers` replace
+    estimates of the same key; `refuses` names keys that are not reported, with the reason; a doubt that `spoils` the
+    record can pass for friction at low speed. A doubt that `explains` the residual keeps others that would explain it
+    from being named. `doubt` is the name of the file.
     """
 
     words: str = ""
@@ -194,10 +191,10 @@ class RaisedDoubt:
 class Doubt:
     """An effect that may be in a log and is not in the model, named by its module (`DOUBTS`).
 
-    `find` yields findings from the case at its `moment`. The reference shows what it `looks_at`, its `consequence`,
-    and by which measurement it is `decided_by`. `after` names doubts that are asked before. `forces` returns forces
-    that the effect would add, to be fitted to what is left: the doubt that explains most of it leads, and the others
-    do not name a cause.
+    `find` yields findings from the case at its `moment`. The reference shows what it `looks_at`, its `consequence`, and
+    by which measurement it is `decided_by`. `after` names doubts that are examined before. `forces` returns forces that
+    the effect would add, to be fitted to the residual: the doubt that explains most of it leads, and the others do not
+    name a cause.
     """
 
     moment: Moment
@@ -210,7 +207,7 @@ class Doubt:
 
 
 DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
-"""Every module of `friso/identification/doubts/` declares one."""
+"""All doubts; every module of `friso/identification/doubts/` declares one."""
 
 
 def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:
@@ -225,11 +222,11 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
 
 
 def causes(case: RecordCase) -> list[RaisedDoubt]:
-    """List what may be wrong with a log that a mass with friction does not describe.
+    """List possible faults of a log that a mass with friction does not describe.
 
-    Faults of the log come first. Next come effects with which the inverse model fits much better, the best first,
-    without those that fit much worse than the best. Causes that count only without such effects come last. Returns []
-    if nothing explains the log.
+    Faults of the log come first, then effects with which the inverse model fits much better, the best first, without
+    those that fit much worse than the best. Causes that count only without such effects come last. Returns [] if
+    nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))
@@ -251,10 +248,7 @@ def way_of(case: FittedCase) -> np.ndarray:
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Return the effect whose forces explain most of what a fit leaves.
-
-    The forces of all doubts are tried. None if none of them explains enough.
-    """
+    """Return the effect whose forces explain most of the residual of a fit, or None if none explains enough."""
     best: LeadingEffect | None = None
     searches = [(name, tries) for name in _at("fit") if (tries := DOUBTS[name].forces) is not None]
     every = [(name, tried) for name, tries in searches for tried in tries(case)]
@@ -273,7 +267,7 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
 
 
 def judged_fit(case: FitCase) -> FitCase:
-    """Ask all doubts about a fit in turn, each with the fit as those before left it."""
+    """Examine all doubts about a fit in turn, each with the fit as changed by earlier ones."""
     for name in _at("fit"):
         for finding in _named(name, case):
             case = case.with_finding(finding)
@@ -281,7 +275,7 @@ def judged_fit(case: FitCase) -> FitCase:
 
 
 def judged_keys(case: KeyCase) -> KeyCase:
-    """Ask all doubts about estimates in turn, each with the estimates as those before left them."""
+    """Examine all doubts about estimates in turn, each with the estimates as changed by earlier ones."""
     for name in _at("key"):
         for finding in _named(name, case):
             case = case.with_answers(finding)
@@ -291,7 +285,7 @@ def judged_keys(case: KeyCase) -> KeyCase:
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
     """Return the determined estimates for which there are reasons as not determined, by key.
 
-    Where Coulomb friction is refused its interval is one of dry friction at low speed, of which it is a part.
+    If Coulomb friction is refused, its interval becomes that of dry friction at low speed, of which it is a part.
     """
     ratio = OutputErrorSettings.current().highest_friction_ratio
     return {
@@ -308,10 +302,10 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
 
 
 def _at(moment: Moment) -> list[str]:
-    """The names of the doubts of a moment, in their order."""
+    """Return the names of the doubts of a moment, in their order."""
     return [name for name in in_order(DOUBTS) if DOUBTS[name].moment == moment]
 
 
 def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
-    """The findings of one doubt, with its name."""
+    """Yield the findings of one doubt, with its name."""
     return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))

@@ -1,4 +1,4 @@
-"""How far a simulated record is from the measured one, and the residual."""
+"""Compute the error of a simulated record, and describe the residual force."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from friso.identification.spread import correlation_length
 
 @dataclass(frozen=True)
 class SimulationErrors:
-    """How far a simulated record is from the measured one, relative to that.
+    """Relative errors of a simulated record: norm of measured minus simulated over norm of measured.
 
-    Each is the norm of measured minus simulated over the norm of the measured signal: position, velocity, acceleration
-    and force, velocity and acceleration of both by the same filter and differences. Of a stage that was held to the
-    log's position only the force has one: what the model does not explain.
+    They are given for position, velocity, acceleration and force; velocity and acceleration of both records come from
+    one filter. A stage that follows the log's position has only the error of the force: the part that the model does
+    not explain.
     """
 
     position: float
@@ -30,11 +30,11 @@ class SimulationErrors:
 
 @dataclass(frozen=True)
 class Residual:
-    """What a fit leaves of the force [N], and what it looks like.
+    """Residual force of a fit [N] and its properties.
 
-    `rms` and `mean` are in newtons, `correlation_time` [s] is the time over which it stays correlated, and
-    `by_position` and `by_velocity` are the shares of its power that its means over places along the rail, and over
-    speeds, explain.
+    `rms` and `mean` are in newtons, `correlation_time` [s] is the time over which it stays correlated. `by_position`
+    and `by_velocity` are the fractions of its power that its means over places along the rail, and over speeds,
+    explain.
     """
 
     rms: float
@@ -45,7 +45,7 @@ class Residual:
 
     @property
     def white(self) -> bool:
-        """Whether neighbouring samples do not resemble each other."""
+        """Tell whether neighbouring samples are uncorrelated."""
         return self.correlation_time == 0.0
 
 
@@ -64,7 +64,7 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the error of a stage held to the log's position: the force that held it there."""
+    """Return the error of a stage that follows the log's position: the force needed to hold it there."""
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 
@@ -82,14 +82,14 @@ def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float)
 
 
 def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
-    """The norm of a difference over the norm of what was measured."""
+    """Return the norm of a difference over the norm of the measured signal."""
     return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
 
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
-    """The share of a residual's power in its means over the bins of another signal.
+    """Return the fraction of a residual's power in its means over the bins of another signal.
 
-    Chance alone explains something, by the number of bins: that is taken off.
+    The part that chance explains is subtracted.
     """
     settings = IdentificationSettings.current()
     edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)

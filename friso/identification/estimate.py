@@ -1,4 +1,4 @@
-"""What an analysis of data answers with: a value and its 95 % interval, or a range and why there is no value."""
+"""Define the result of an analysis: a value with its 95 % interval, or a range and the reason why there is no value."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from friso.intervals import COVERAGE
 
 NO_INTERVAL = "how far off it may be is not known"
-"""Why a value whose interval has no width, or no ends, is not determined."""
+"""Reason why a value without a finite interval is not determined."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A quantity found from data, with its 95 % interval or the reason why it has no value.
+    """A quantity identified from data, with its 95 % interval or the reason why it has no value.
 
     `name` is a key of the stage file ("friction.coulomb") or a description ("resonance 1 frequency"); all numbers are
-    in the SI `unit`. `low` to `high`, finite and apart, is the interval of the `value`. If the data cannot show the
-    quantity, `value` is NaN, `reason` says why, and `low` and `high` are what remains possible (infinite if nothing is
-    known). `systematic` is the part of the interval's half-width that does not shrink when the experiment is repeated.
+    in the SI `unit`. The `value` has the interval from `low` to `high`, finite and not equal. If the data cannot show
+    the quantity, `value` is NaN, `reason` says why, and `low` and `high` bound the remaining range (infinite if nothing
+    is known). `systematic` is the part of the interval's half-width that repetition does not reduce.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Estimate:
     systematic: float = 0.0
 
     def __post_init__(self) -> None:
-        """Turn a value without an interval around it into one that is not determined."""
+        """Turn a value without an interval into one that is not determined."""
         if self.reason or (np.isfinite([self.value, self.low, self.high]).all() and self.low < self.high):
             return
         for name, end in (("value", np.nan), ("low", -np.inf), ("high", np.inf), ("reason", NO_INTERVAL)):
@@ -53,14 +53,14 @@ class Estimate:
 
     @property
     def determined(self) -> bool:
-        """Whether the data determine the value."""
+        """Tell whether the data determine the value."""
         return not self.reason
 
     @property
     def half_width(self) -> float:
-        """Half of the interval."""
+        """Return half of the width of the interval."""
         return (self.high - self.low) / 2
 
     def holds(self, truth: float) -> bool:
-        """Tell whether the interval holds a value."""
+        """Tell whether the interval contains a value."""
         return bool(self.low <= truth <= self.high)

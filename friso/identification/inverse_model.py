@@ -33,7 +33,7 @@ NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class InverseModel:
-    """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with what it rests on.
+    """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with its data.
 
     It has `estimates`, and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and "...
     backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and forces
@@ -51,11 +51,11 @@ class InverseModel:
 
     @property
     def error(self) -> float:
-        """The norm of what is left of the force, over the norm of the force."""
+        """Return the norm of the residual force over the norm of the force."""
         return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
 
     def value(self, name: str) -> float:
-        """Return what least squares made of a column by name, whether the log shows it or not."""
+        """Return the least-squares coefficient of a column by name, whether determined or not."""
         return self.solution[name]
 
     def estimate(self, name: str) -> Estimate:
@@ -95,10 +95,10 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
 
 
 def bandwidth_of(log: Log) -> float:
-    """Read the bandwidth [Hz] of the motion off a log, none of it across gaps.
+    """Return the bandwidth [Hz] of the motion in a log, without reading across gaps.
 
     It is the frequency below which the acceleration has 95 % of its power, as far as the position stands out of its
-    noise. Raises InputError where it does nowhere.
+    noise. Raises InputError if it never does.
     """
     settings = IdentificationSettings.current()
     lengths = [part.stop - part.start for part in log.segments]
@@ -143,13 +143,13 @@ def inverse_model(
     """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
     With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
-    distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
-    by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
-    friction.
+    distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, taken from the log
+    by default. For a stage on a joint, `cart_share` is the fraction of the mass that moves with the measured cart, on
+    which friction acts.
 
-    `averaged` is the number of samples over which the log's force is averaged, as then are the columns. `extra` columns
-    by name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
-    for a log too short.
+    `averaged` is the number of samples over which the log's force is averaged; the columns are averaged alike. `extra`
+    columns by name, shape (n,), are fitted as well, and their part is subtracted from the measured force. Raises
+    InputError for a log that is too short.
     """
     settings = IdentificationSettings.current()
     band = bandwidth or bandwidth_of(log)
@@ -195,14 +195,14 @@ def inverse_model(
 def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit a force [N], shape (rows,), by columns, shape (rows, columns).
 
-    Returns the solution, shape (columns,), and what it leaves [N], shape (rows,).
+    Returns the solution, shape (columns,), and the residual [N], shape (rows,).
     """
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     return solution, force - columns @ solution
 
 
 def _other_sign(log: Log) -> str:
-    """Return the scale with which the force of a log was read, with the other sign."""
+    """Return the scale that reverses the sign with which the force of a log was read."""
     scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
     scale = next((match for match in scales if match), None)
     if scale is None:
@@ -230,7 +230,7 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Tell which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    """Tell which rows belong to a lasting stretch of slow rows, shape (rows,)."""
     settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
@@ -254,10 +254,7 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, columns, forces and positions of a segment, filtered and decimated.
-
-    The columns include the extra ones.
-    """
+    """Return times, columns (with the extra ones), forces and positions of a segment, filtered and decimated."""
     settings = IdentificationSettings.current()
     if part.stop - part.start < 2 * settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
@@ -297,5 +294,5 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
 
 
 def _first(count: int, step: int) -> int:
-    """The first row kept, so that the last one is."""
+    """Return the first row to keep when rows are thinned, so that the last one is kept too."""
     return (count - 1) % step

@@ -1,4 +1,4 @@
-"""What a kind of experiment declares of itself: the logs it takes, how they are analysed, what they tell of a stage."""
+"""Define what a kind of experiment declares: its logs, their analysis, and the keys of a stage that it determines."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from friso.stage import Stage, parse_set
 from friso.stage.controllers import CONTROLLER
 
 Source = Log | MeasuredResponse
-"""What a file may hold: signals over time, or a frequency response as somebody measured it."""
+"""Contents of a file: signals over time, or a frequency response from another instrument."""
 
 Result = TypeVar("Result")
 
 FirstEstimates = Callable[[str, Sequence[Estimate]], object]
-"""A function that is given the name of a log and the first estimates of it."""
+"""Function that receives the name of a log and its first estimates."""
 
 
 @dataclass(frozen=True)
 class AnalysisSettings:
-    """What the user chose for an analysis; None where friso is to find it.
+    """The user's choices for an analysis; None if friso is to choose.
 
     `bandwidth` [Hz] is that of moves for the inverse model, `band` [Hz] and `period` [s] are those of frequency
-    responses. `progress` is told how far an analysis is, and `tell` the first estimates of a log, by its name, which a
-    longer analysis then improves.
+    responses. `progress` receives the progress of an analysis, and `tell` the first estimates of a log, by name, which
+    a longer analysis then improves.
     """
 
     bandwidth: float | None = None
@@ -49,11 +49,11 @@ NOTHING_CHOSEN = AnalysisSettings()
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the machine before an experiment is analysed.
+    """Prior knowledge of the machine for the analysis of an experiment.
 
-    `stage` is None if there is none. `from_user` says whether the user gave it, so that its controller is the
-    machine's. `estimates` are results of experiments analysed before, by key. `made_up` are the keys of the stage that
-    were made up around a log, because the file lacks their tables.
+    `stage` is None if there is none. `from_user` tells whether the user gave it, so that its controller is the
+    machine's. `estimates` are results of earlier experiments, by key. `made_up` are the keys of the stage that were
+    made up for a log, because the file lacks their tables.
     """
 
     stage: Stage | None = None
@@ -62,28 +62,28 @@ class Prior:
     made_up: Collection[str] = ()
 
     def flat(self, log: Log) -> dict[str, Any]:
-        """Return the flat keys of the stage as it was set up for a log; {} without a stage.
+        """Return the flat keys of the stage as set up for a log; {} without a stage.
 
         Raises InputError.
         """
         return {} if self.stage is None else as_set_up(self.stage, log)
 
     def user_told(self, key: str, log: Log) -> bool:
-        """Tell whether the user stated a key of the stage as it was set up for a log.
+        """Tell whether the user stated a key of the stage as set up for a log.
 
         Raises InputError.
         """
         return self.from_user and key not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
-        """Return the flat keys of the stage with the values that other experiments show.
+        """Return the flat keys of the stage, with values from other experiments.
 
         Raises InputError.
         """
         return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
 
     def masses(self, log: Log) -> tuple[float, float]:
-        """Return the mass [kg] of the cart and of the stage as believed, 0 for what is not known.
+        """Return the assumed mass [kg] of the cart and of the stage, 0 if not known.
 
         Raises InputError.
         """
@@ -92,10 +92,10 @@ class Prior:
 
 
 def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
-    """Return the flat keys of the stage as it was set up for a log.
+    """Return the flat keys of the stage as set up for a log.
 
-    What the stage does not have is left out (`left_out`), but for a controller of another form, which replaces the
-    stage's. Raises InputError.
+    Keys that the stage does not have are left out (`left_out`), except for a controller of another form, which replaces
+    the stage's. Raises InputError.
     """
     setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
     changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
@@ -118,10 +118,10 @@ def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
 
 @dataclass(frozen=True)
 class Predictor(Generic[Result]):
-    """How a result predicts another log, with what is known of the machine.
+    """Prediction of another log by a result, with prior knowledge of the machine.
 
-    `predict` returns the prediction, or None for a log that it cannot predict. `needs` says in words what there has to
-    be. `check` raises InputError where logs, to which nothing has been fitted yet, will not be able to.
+    `predict` returns the prediction, or None for a log that it cannot predict. `needs` states the requirements in
+    words. `check` raises InputError, before any fit, if logs will not meet them.
     """
 
     needs: str
@@ -133,22 +133,20 @@ class Predictor(Generic[Result]):
 class ExperimentKind(Generic[Result]):
     """A kind of experiment, named by its module, which is also its word on the command line.
 
-    `analyse` returns the result of a group of logs, of a class of the kind's own; `estimates` says what the result
-    means for keys of the stage file, and `correlated` how these are correlated. `after` names the kinds whose results
-    it uses.
+    `analyse` returns the result of a group of logs, of a class of the kind's own; `estimates` gives keys of the stage
+    file from the result, and `correlated` their correlation. `after` names the kinds whose results it uses.
 
     `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the last.
-    `si`: they have to be in SI units, except the `foreign` ones (a force in volts). `per_unit`: the analysis is the
-    same whatever the unit of the force, and results are then per volt. `partial`: tells whether a log shows too little
-    for a result of its own, such as one event; such logs count as one log with gaps. `together`: all logs are
-    realisations of one experiment; `responses`: it also takes frequency responses that another instrument has
-    computed.
+    `si`: they must be in SI units, except the `foreign` ones (a force in volts). `per_unit`: the analysis does not
+    depend on the unit of the force, and results are then per volt. `partial`: tells whether a log shows too little by
+    itself, such as one event; such logs count as one log with gaps. `together`: all logs are realisations of one
+    experiment; `responses`: it also takes frequency responses from another instrument.
 
-    `claims` says why a log without a stated kind may be of this one, or None; `claims_together` does so for several
-    logs, whatever each seems to be alone. `around` makes up a stage around a log if none is given. `notes` tell the
-    engineer what to know about results, with or without a stage; `doubts` are sentences against believing a result,
-    and `failed` tells whether its analysis failed, even if some of it still holds. Functions raise InputError for logs
-    that cannot be used.
+    `claims` returns why a log without a stated kind may be of this one, or None; `claims_together` does so for several
+    logs, whatever each seems to be alone. `around` makes up a stage for a log if none is given. `notes` are remarks on
+    results for the engineer, with or without a stage; `doubts` are sentences against trusting a result, and `failed`
+    tells whether its analysis failed, even if parts of it hold. Functions raise InputError for logs that cannot be
+    used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
@@ -171,7 +169,7 @@ class ExperimentKind(Generic[Result]):
     failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return the roles that a log needs, where these are mapped."""
+        """Return the roles that a log with the given mapped roles needs."""
         choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 

@@ -11,14 +11,11 @@ if TYPE_CHECKING:  # the names are asked for by --help, which shall not take a s
     from friso.identification.kind import ExperimentKind
 
 KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiments", "KIND")
-"""Every module of `friso/identification/experiments/` declares one."""
+"""All kinds of experiment; every module of `friso/identification/experiments/` declares one."""
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
-    """Return the names of a registry so that each comes after those it depends on.
-
-    An entry names in `after` what has to come before it. Otherwise names are in alphabetical order.
-    """
+    """Return the names of a registry so that each comes after those in its `after`, else in alphabetical order."""
     sorter = TopologicalSorter(
         {name: [other for other in registry[name].after if other in registry] for name in registry}
     )

@@ -1,4 +1,4 @@
-"""From logs of several experiments to one stage: each analysed in its way, and what they agree on."""
+"""Identify one stage from logs of several experiments: analyse each, and combine the results."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Identification:
-    """What logs of several experiments show of a machine.
+    """Result of identification from logs of several experiments.
 
-    `stage` has uncertain keys; it is None where neither a stage was given nor a log around which one could be made up,
-    or where nothing was identified. `correlations` are those of its keys, `estimates` what went into it (one per key),
-    and `warnings` what the engineer should know.
+    `stage` has uncertain keys; it is None if no stage was given or could be made up, or nothing was identified.
+    `correlations` are those of its keys, `estimates` the combined ones (one per key), and `warnings` are for the
+    engineer.
 
-    `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
-    still holds. `origins` says of each key of the stage where it comes from; `laws`, if asked, which laws fit.
+    `doubts` are sentences against trusting the result, and `failed` tells whether an analysis failed, even if parts of
+    it hold. `origins` gives the origin of each key of the stage; `laws`, if asked, the supported friction laws.
     """
 
     stage: Stage | None
@@ -73,11 +73,10 @@ def identify(
     progress: Progress = silent,
     made_up: Collection[str] = (),
 ) -> Identification:
-    """Identify the stage behind logs, each with its kind of experiment.
+    """Identify the stage from logs, each with its kind of experiment.
 
-    `base` is what is known of the stage beforehand, of which some keys may be `made_up` around a log. With a base whose
-    controller is the machine's, moves with a reference are simulated in closed loop. Raises InputError for logs that
-    cannot be used.
+    `base` is the prior stage, of which some keys may be `made_up` for a log. With a base whose controller is the
+    machine's, moves with a reference are simulated in closed loop. Raises InputError for logs that cannot be used.
     """
     if base is not None and base.conditions is not None:
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
@@ -121,7 +120,7 @@ def with_laws(
 ) -> Identification:
     """Return an identification with the friction laws that its logs support.
 
-    Fits begin from `base` where its law allows that. Raises InputError as `compare_laws`.
+    Fits start from `base` if its law allows that. Raises InputError as `compare_laws`.
     """
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
@@ -131,16 +130,16 @@ def with_laws(
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
-    """Tell whether no estimate is determined, nor bounds anything unless the analysis `failed`."""
+    """Tell whether no estimate is determined or bounded, unless the analysis `failed`."""
     ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
     none_determined = not any(estimate.determined for estimate in estimates)
     return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))
 
 
 def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
-    """Return the kind of axis of logs and of what is known of the machine.
+    """Return the kind of axis of the logs and the prior stage.
 
-    Raises InputError where they differ.
+    Raises InputError if they differ.
     """
     kinds = {source.name: source.axis for source in sources if isinstance(source, Log)}
     if base is not None:
@@ -181,7 +180,7 @@ def predict(
 ) -> Prediction:
     """Predict another log of the machine by the first experiment that can.
 
-    Kinds that use the results of others come first. The stage is that of the one experiment, not of all combined, so
+    Kinds that use the results of others come first. The stage is that of the one experiment, not the combination, so
     that the errors are those of one record on another. The controller is taken from `base`, or from the log's own
     set-up. Raises InputError if none can.
     """
@@ -196,14 +195,14 @@ def predict(
 
 
 def _unpredictable(log: Log) -> InputError:
-    """The error for a log that no kind of experiment at hand predicts."""
+    """Return the error for a log that no available kind of experiment can predict."""
     needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
     expected = ", or ".join(needs)
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
 
 
 def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Return the doubts about the results: one by one for a single experiment, else by logs."""
+    """Return the doubts about the results: one by one for a single experiment, otherwise grouped by logs."""
     doubts_by_log = [KINDS[experiment.kind].doubts(experiment.result) for experiment in experiments]
     if len(experiments) == 1:
         return tuple(doubts_by_log[0])
@@ -212,7 +211,7 @@ def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
-    """Say for each log which keys of its set-up the stage does not have."""
+    """Return for each log the keys of its set-up that the stage does not have, in words."""
     several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
         f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
@@ -231,7 +230,7 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
 
 
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
-    """Make up a stage around the first log that shows enough of a machine; None without one."""
+    """Make up a stage for the first log that determines enough of a machine; None without one."""
     for log, kind in logs:
         make = KINDS[kind].around
         if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:
@@ -245,7 +244,7 @@ def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
 
 
 def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
-    """List what the engineer should know of the results, kind by kind."""
+    """List notes on the results for the engineer, by kind."""
     results: dict[str, list[Any]] = {}
     for experiment in experiments:
         results.setdefault(experiment.kind, []).append(experiment.result)

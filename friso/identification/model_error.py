@@ -1,4 +1,4 @@
-"""What the whole model lacks, in the intervals of its estimates; and the inverse model's estimates in its place."""
+"""Widen intervals of the whole model by what it lacks, or replace them by those of the inverse model."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from friso.identification.output_error.parameters import BRISTLES, is_free
 from friso.identification.settings import DoubtSettings
 
 NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
-"""Why nothing at all is taken from a fit."""
+"""Reason why nothing is reported from a fit."""
 
 SPOILT = "what is wrong with the record would pass for it"
-"""Why nothing but what the inverse model shows is taken from a record with a delay, a filter and the like."""
+"""Reason why a record with a delay, a filter or a similar fault gives only what the inverse model shows."""
 
 CONTRADICTED = "the whole model contradicts the record"
-"""Why nothing but what the inverse model shows is taken from a fit."""
+"""Reason why a fit is replaced by the inverse model."""
 
 
 def allowed_for(case: KeyCase) -> KeyCase:
-    """Return the case with intervals that allow for what the model lacks and for causes found.
+    """Return the case with intervals that include the model error and the causes found.
 
-    Nothing is taken from a fit that describes nothing; a fit that contradicts the record is replaced by the inverse
-    model. What the model lacks can pass for bristles: with a load behind a coupling of 40 Hz, and with a force 2 ms
+    A fit that describes nothing gives nothing; a fit that contradicts the record is replaced by the inverse model.
+    Effects that the model lacks can pass for bristles: with a load behind a coupling of 40 Hz, and with a force 2 ms
     early, their stiffness came out at half of the truth, outside an interval twice as wide as the noise allowed.
     """
     quality = case.quality
@@ -50,7 +50,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
 
 
 def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
-    """Return the quantity of the inverse model behind a key, and the key over that quantity."""
+    """Return the quantity of the inverse model for a key, and the factor from it to the key."""
     bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
     total = sum(flat[key] for key in bodies)
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
@@ -66,10 +66,7 @@ def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Return estimates and correlation from the inverse model, for the keys that it shows.
-
-    All other keys are withheld.
-    """
+    """Return estimates and correlation from the inverse model, for the keys that it determines; others are withheld."""
     sources, answers = inverse_sources(flat), []
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
@@ -87,11 +84,11 @@ def of_inverse_model(
 def with_model_error(
     estimate: Estimate, inverse: Estimate, scale: float, lacking: float, alike: float = 1.0
 ) -> Estimate:
-    """Return an estimate of the whole model whose interval allows for what the model lacks.
+    """Return an estimate of the whole model whose interval includes the model error.
 
-    It is as much wider as it lies outside of the inverse model's interval, by the share of what is left that is not
-    noise (`lacking`); and no narrower than that interval where both models leave `alike` much, 1 for as much as the
-    inverse model: what both lack moves both. `scale` is the key over the inverse model's quantity.
+    It is extended by its distance from the inverse model's interval, times `lacking`, the fraction of the residual that
+    is not noise. It is no narrower than that interval times `alike`, which is 1 if both models leave equally much:
+    shared errors move both. `scale` is the factor from the inverse model's quantity to the key.
     """
     if not (estimate.determined and inverse.determined):
         return estimate
@@ -102,11 +99,10 @@ def with_model_error(
 
 
 def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
-    """Estimates of a rigid stage with intervals that allow for what the model lacks.
+    """Return estimates of a rigid stage with intervals that include the model error.
 
-    Of moves in one direction the model leaves out the constant force, which the stage turns against where it
-    overshoots: none is narrower than that of the inverse model. What the inverse model does not know has wider
-    intervals where the fit lacks something.
+    For moves in one direction the model leaves out the constant force, so no interval is narrower than that of the
+    inverse model. Quantities that the inverse model does not have get wider intervals if the fit lacks something.
     """
     inverse, quality, sources = case.inverse, case.quality, inverse_sources(case.flat)
     plainly_left = float(np.sqrt(np.mean((inverse.measured - inverse.fitted) ** 2)))
@@ -123,10 +119,7 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Return estimates that allow for causes, if the log is spoilt.
-
-    Their intervals reach to the values of the log corrected for each cause.
-    """
+    """Return estimates whose intervals reach to the values of the log corrected for each cause."""
     if not case.quality.spoilt:
         return {}
     answers = {}
@@ -140,13 +133,13 @@ def _with_causes(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _imitated_by_causes(case: KeyCase) -> dict[str, str]:
-    """Why nothing of what a spoilt record says beyond the inverse model is believed, by key."""
+    """Return, by key, why quantities beyond the inverse model are not reported for a faulty record."""
     others = case.determined.keys() - inverse_sources(case.flat).keys() if case.quality.spoilt else ()
     return dict.fromkeys(others, SPOILT)
 
 
 def _reaching(case: KeyCase) -> dict[str, Estimate]:
-    """Estimates with intervals that hold what findings say of quantities of the inverse model."""
+    """Return estimates with intervals that contain what findings state about quantities of the inverse model."""
     answers = {}
     for finding in case.quality.findings:
         for key, (name, scale) in inverse_sources(case.flat).items():
@@ -158,7 +151,7 @@ def _reaching(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _wider(estimate: Estimate, much: bool) -> Estimate:
-    """An estimate with a wider interval where `much` is left that nothing explains."""
+    """Return an estimate with a wider interval if `much` is left unexplained."""
     more = (DoubtSettings.current().widening_where_much_is_left - 1) * estimate.half_width if much else 0.0
     return replace(estimate, low=estimate.low - more, high=estimate.high + more)
 
@@ -166,7 +159,7 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
     """Return a quantity of the inverse model without a cause, and how far it may still move.
 
-    What is left unexplained may have that cause too, at most by as much again.
+    The residual may have that cause too, at most by as much again.
     """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))
@@ -175,7 +168,7 @@ def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Esti
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
     """Return an estimate whose interval also covers another one, and `further`, times `scale`.
 
-    The two differ by a cause that nobody has settled.
+    The two differ by a cause that is not decided.
     """
     if not (estimate.determined and other.determined):
         return estimate

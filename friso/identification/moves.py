@@ -1,5 +1,4 @@
-"""The analysis of moves: the inverse model by least squares, then the whole model by its output error; and another log
-of the same machine, simulated with what they show."""
+"""Analyse moves: the inverse model by least squares, then the whole model by its output error; predict other logs."""
 
 from __future__ import annotations
 
@@ -33,20 +32,20 @@ from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
 FITTED, REPEATED = 0.8, 0.92
-"""Shares of the work up to the ends of its parts: the fit, and its repetition on simulated logs; the last is the fit of
+"""Fractions of the work up to the ends of its parts: the fit, and its repetition on simulated logs; the last part fits
 either direction alone."""
 
 
 @dataclass(frozen=True)
 class IdentifiedMoves:
-    """What an analysis of moves found.
+    """Result of an analysis of moves.
 
     It has both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name, the estimates
-    by key of the stage file with the `correlation` of the shown ones, what the motion covers, the simulated record of
-    the fit and its errors, and `part`, the samples of the log used.
+    by key of the stage file with the `correlation` of the determined ones, the coverage of the motion, the simulated
+    record of the fit and its errors, and `part`, the samples used.
 
-    `loop` is the machine's own closed loop, which was simulated; without it (None) the stage followed the log, and the
-    simulated force is what it took to hold it there, which the model does not explain.
+    `loop` is the machine's own closed loop, if it was simulated; without it (None) the stage followed the log, and the
+    simulated force is what held it there, which the model does not explain.
     """
 
     log: Log
@@ -66,17 +65,17 @@ class IdentifiedMoves:
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
-        """The estimates that the rows of `correlation` stand for."""
+        """Return the estimates that the rows of `correlation` belong to."""
         return tuple(estimate for estimate in self.estimates if estimate.determined)
 
     @property
     def force_unit(self) -> str:
-        """The unit of the force, which estimates hold in the newton's place."""
+        """Return the unit of the force, which replaces the newton in estimates."""
         return self.log.unit("force")
 
     @property
     def flat(self) -> dict[str, Any]:
-        """The stage as fitted, as flat keys; what the record does not show is as in the stage given."""
+        """Return the fitted stage as flat keys; keys that the record does not determine stay as given."""
         return self.fit.stage
 
 
@@ -154,9 +153,8 @@ def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage
 class SimulatedLog:
     """Another log of the same axis, simulated.
 
-    It has the samples used, the record and its errors; `apart` is how far the farthest of the machines drawn from the
-    estimates goes from that record, as a share of the position: infinitely far where one does not keep to finite
-    numbers.
+    It has the samples used, the record and its errors; `apart` is the largest deviation of machines drawn from the
+    estimates, relative to the position (infinite if one diverges).
     """
 
     part: slice
@@ -234,20 +232,17 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """Return the cart's share of the mass, if the cart is measured and the joint is free.
-
-    Otherwise return 0.
-    """
+    """Return the cart's fraction of the mass if the cart is measured and the joint is free, otherwise 0."""
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
-    """Return the values at which the fit starts, from the inverse model as far as it shows them.
+    """Return the values at which the fit starts, from the inverse model as far as it determines them.
 
-    The inverse model knows one body. Values that it cannot distinguish from 0 start within their interval. A stage on
-    a free joint whose cart is not measured starts at the values given.
+    The inverse model has one body. Values that cannot be distinguished from 0 start within their interval. A stage on a
+    free joint without a measured cart starts at the given values.
     """
     if is_free(flat) and not _cart_share(log, flat):
         mass = flat["masses.cart"] + flat["masses.stage"]

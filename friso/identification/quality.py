@@ -1,4 +1,4 @@
-"""The quality of a fit of moves: what it leaves unexplained against the noise of the record, and what may be wrong."""
+"""Judge a fit of moves: its residual against the noise of the record, and possible causes."""
 
 from __future__ import annotations
 
@@ -19,24 +19,23 @@ UNKNOWN = (
     "a delay, a filter, a constant force, one that drifts or varies with position, a missing feedforward and a mode in "
     "the band were considered, and none explains it: check --scale, including its sign, and which channel is which"
 )
-"""What to do where no cause is found."""
+"""Advice if no cause is found."""
 
 WITHOUT_FRICTION = ". The stage file says that there is no friction: with a table [friction], friction is identified"
-"""What to do where the structure that was told leaves friction out."""
+"""Advice if the given structure has no friction."""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a fit of moves describes its record, with what speaks against believing it.
+    """Quality of a fit of moves, with reasons against trusting it.
 
-    `noise` [N] is that of the record's force; `left` [N] the RMS that the fit leaves of it where it counts, and
-    `noise_left` what the noise alone would leave there. `inverse_error` and `whole_error` are relative errors of the
-    force: by the inverse model, and by steady friction and mass of the whole model on the samples of the inverse model.
-    `findings` are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). The inverse
-    models `without` a cause are of a log rid of what may be wrong with it. A record is `spoilt` where what is wrong
-    with it passes for friction at low speed, and `unsettled` where much is left for which no cause was found. A cause
-    is `seen` where the samples themselves show it, as a force that clips: no effect is named then that would
-    explain it.
+    `noise` [N] is that of the record's force; `left` [N] the RMS residual where it counts, and `noise_left` the
+    residual of noise alone. `inverse_error` and `whole_error` are relative errors of the force: by the inverse model,
+    and by steady friction and mass of the whole model on the samples of the inverse model. `findings` are the doubts
+    raised. The whole model may be `rejected`, or nothing holds at all (`failed`). The inverse models `without` a cause
+    are of the corrected log. A record is `spoilt` if its fault passes for friction at low speed, and `unsettled` if a
+    large residual has no known cause. A cause is `seen` if the samples themselves show it, as clipping: no effect is
+    named then.
     """
 
     noise: float
@@ -54,22 +53,22 @@ class Quality:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Sentences that speak against believing the fit."""
+        """Return sentences against trusting the fit."""
         return tuple(finding.words for finding in self.findings if finding.words)
 
     @property
     def ratio(self) -> float:
-        """What is left over what noise alone would leave."""
+        """Return the residual over that of noise alone."""
         return self.left / self.noise_left if self.noise_left > 0 else np.inf
 
     @property
     def lacks_something(self) -> bool:
-        """Whether the fit leaves clearly more than noise."""
+        """Tell whether the fit leaves clearly more than noise."""
         return self.ratio > DoubtSettings.current().noise_ratio_of_a_lacking_model
 
     @property
     def lacking(self) -> float:
-        """Share of what is left, RMS, that is not noise: 0 of a model that lacks nothing."""
+        """Return the fraction of the RMS residual that is not noise: 0 for a complete model."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
 
 
@@ -78,11 +77,10 @@ def quality_of(
 ) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
 
-    Where it is `led` by an effect that explains what the fit leaves, the inverse model's causes are not named: the
-    effect is.
+    If it is `led` by an effect that explains the residual, that effect is named instead of the inverse model's causes.
 
-    The whole model may describe a record that is `beyond` the inverse one, which does not know of sticking. A cause is
-    no doubt then if the whole model is clearly better than the inverse model without it.
+    The whole model may describe a record that is `beyond` the inverse one, which has no sticking. A cause is no doubt
+    then if the whole model is clearly better than the inverse model without it.
     """
     settings, case = DoubtSettings.current(), RecordCase(log, inverse, cart_share)
     flat, left, passed = fit.stage, fit.left, noise * fit.problem.passes
@@ -122,7 +120,7 @@ def quality_of(
 def _verdict(
     plain: Quality, reasons: list[RaisedDoubt], unit: str, poor: bool, rejected: bool, frictionless: bool
 ) -> str:
-    """What the fit leaves unexplained and why, in a sentence; "" where it lacks nothing."""
+    """Return in a sentence how much the fit leaves unexplained, and why; "" for a complete model."""
     why = "".join(f"; {cause.words}" for cause in reasons)
     if poor:
         return (
@@ -152,10 +150,9 @@ def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray
 
 
 def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
-    """Return the relative force error of a stage's mass and steady friction.
+    """Return the relative force error of a stage's mass and steady friction, on the samples of the inverse model.
 
-    It is taken on the samples of the inverse model. Dry friction turns as gradually as the direction in the inverse
-    model, whose columns are filtered.
+    Dry friction changes sign as gradually as the filtered direction in the inverse model.
     """
     mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
     acceleration, velocity, sign, _ = inverse.columns.T

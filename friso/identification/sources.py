@@ -1,4 +1,4 @@
-"""The files given: what each holds, how it is mapped, and which kind of experiment it is."""
+"""Read the given files: contents, mapping, and kind of experiment of each."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
 
 MOVED = ("position", "force")
-"""Roles by which the kind of an experiment is recognised."""
+"""Roles from which the kind of an experiment is recognised."""
 
 
 @dataclass(frozen=True)
 class LogFile:
     """A log file: its content, its kind of experiment, and the reason for that kind.
 
-    `mapping` says how it was read, and `mapping_file` is the file where that is kept (None: it is not kept). `earlier`
-    is the part of the mapping that was taken from that file, `replaced` the part of the file that the user overrode.
+    `mapping` is how it was read, and `mapping_file` stores that (None: it is not stored). `earlier` is the part of the
+    mapping taken from that file, `replaced` the part of the file that the user overrode.
     """
 
     path: Path
@@ -41,7 +41,7 @@ class LogFile:
 
     @property
     def reused(self) -> str:
-        """A sentence on what nobody said this time, and on what was kept otherwise; "" for nothing."""
+        """Return a sentence on reused and replaced parts of a stored mapping; "" for none."""
         words, place = self.earlier.words, self.mapping_file or sidecar(self.path)
         parts = [f"read as kept in {place.name}: {words}"] if words else []
         parts += [f"in place of {self.replaced}, as kept"] if self.replaced else []
@@ -49,13 +49,13 @@ class LogFile:
 
 
 class OpenQuestions(GapsError):
-    """What several logs do not tell, of all of them."""
+    """Error with the missing information of several logs."""
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
-    """Read the files, mapped by the options or by what was kept beside them or in `folder`.
+    """Read the files, mapped by the options or by stored mappings beside them or in `folder`.
 
-    Raises OpenQuestions for all that is missing, InputError for what cannot be read.
+    Raises OpenQuestions for everything that is missing, InputError for unreadable files.
     """
     files, wrong = read_usable(paths, options, folder)
     if wrong:
@@ -114,10 +114,9 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
 
 
 def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
-    """Turn a file whose force is not in newtons into a log on an axis with forces in that unit.
+    """Convert a file whose force is not in newtons to forces in that unit, for kinds analysed per unit of force.
 
-    That is for kinds that are analysed per unit of force. Raises InputError beside a stage, of such an axis, whose
-    numbers are in newtons.
+    Raises InputError beside a stage with such an axis, whose numbers are in newtons.
     """
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
@@ -132,14 +131,14 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
 
 
 def _holders(options: Mapping, paths: Sequence[Path]) -> dict[str, list[bool]]:
-    """Tell for each channel that the options name which of the files have it."""
+    """Tell for each channel in the options which of the files have it."""
     return {name: [_has(path, name) for path in paths] for name in {*options.roles.values(), *options.units}}
 
 
 def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) -> Mapping:
-    """Return what of the options the file of a place can use, by which files have the channels.
+    """Return the options that the file of a place can use, by which files have the channels.
 
-    What no file can use stays, to be answered where it is read.
+    Options that no file can use stay, and raise an error when that file is read.
     """
     lacking = {name for name, held in holders.items() if any(held) and not held[place]}
     if not lacking:
@@ -181,9 +180,9 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
-    """Return a log without a stated kind, its kind of experiment, and why.
+    """Return a log without a stated kind, its kind of experiment, and the reason.
 
-    Raises GapsError for all that is open, the units included that most kinds need.
+    Raises GapsError for everything that is missing, including units that most kinds need.
     """
     gaps: list[LogError] = []
     kind = reason = ""
@@ -207,10 +206,7 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """Return a log without known instants, sample by sample, so that its course can be seen.
-
-    None if that is not possible.
-    """
+    """Return a log without known instants, sample by sample, to describe its course; None if not possible."""
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
     except LogError:
@@ -218,7 +214,7 @@ def _without_clock(path: Path, mapping: Mapping) -> Log | None:
 
 
 def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
-    """Return where a log's mapping is kept, beside it or in `folder`; None if there is none."""
+    """Return the file of a log's mapping, beside it or in `folder`; None without one."""
     return None if mapping == Mapping() else place_for(path, folder)
 
 
@@ -229,9 +225,9 @@ def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:
-    """Return the only kind of experiment that a log without a stated kind may be of, and why.
+    """Return the only possible kind of experiment of a log without a stated kind, and the reason.
 
-    Raises InputError where none claims it, or several do.
+    Raises InputError if no kind claims it, or several do.
     """
     course = Course(log)
     claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}

@@ -1,4 +1,4 @@
-"""How uncertain a least-squares fit is whose residuals are not independent: neighbouring errors are correlated."""
+"""Compute the uncertainty of a least-squares fit with correlated residuals."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def correlation_length(residual: np.ndarray) -> int:
 
 
 def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return groups in which a motion may make errors alike, each of shape (n,).
+    """Return groups of samples whose errors may be correlated, each of shape (n,).
 
-    They are blocks of time, places, and speeds, speeding up and slowing down apart, of a position [m], velocity [m/s]
-    and acceleration [m/s^2]. What a model lacks returns with place and speed: a motion that is repeated repeats it, and
-    says nothing new.
+    They are blocks of time, places, and speeds (accelerating and decelerating separately), of a position [m], velocity
+    [m/s] and acceleration [m/s^2]. Model errors return with place and speed, so a repeated motion gives no new
+    information.
     """
     settings = IdentificationSettings.current()
     return (
@@ -56,11 +56,10 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.nd
     """Return the covariance of fitted parameters, (p, p).
 
     The Jacobian has the shape (n, p), the residual (n,). Errors need be neither equal nor independent: Newey, West
-    1987, doi:10.2307/1913610, with a window as long as the residuals, or their products with a column, stay
-    correlated.
+    1987, doi:10.2307/1913610, with a window as long as the residuals, or their products with a column, stay correlated.
 
-    Errors may also be alike within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers of
-    shape (n,): each parameter has the largest of the resulting deviations, widened by Student's t for the number of
+    Errors may also be correlated within each of some `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers
+    of shape (n,): each parameter has the largest of the resulting deviations, widened by Student's t for the number of
     groups. Directions in which the fit does not depend on the parameters have an infinite variance.
     """
     count, size = jacobian.shape

@@ -1,4 +1,4 @@
-"""The stage file that identification writes: the stage given (or one made up around a log), with the estimates."""
+"""Write the identified stage file: the given stage (or one made up for a log), with the estimates."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
 def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
     """Return the stage with its identified keys as values with intervals, or as ranges.
 
-    Units follow the stage's kind of axis. A stiffness that follows from a [flexure] is left to it. Raises InputError
+    Units follow the stage's kind of axis. A stiffness that follows from a [flexure] is not replaced. Raises InputError
     if the values contradict each other; values from `fitting` do not.
     """
     changes: dict[str, object] = {}
@@ -84,7 +84,7 @@ def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable
 
 
 TOLD_BY_LOGS = ("masses", "friction", "motion")
-"""Tables of a stage file that a log of moves can stand in for."""
+"""Tables of a stage file that a log of moves can replace."""
 
 
 def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
@@ -96,10 +96,9 @@ def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
 def origins(
     stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], chosen: Collection[str] | None
 ) -> dict[str, str]:
-    """Say where each key of an identified stage comes from.
+    """Return the origin of each key of an identified stage, in words.
 
-    It comes from estimates, follows another key, stands in the stage file, or is our choice of the `chosen` keys (None:
-    all).
+    It may be an estimate, another key, the stage file, or friso's choice of the `chosen` keys (None: all).
     """
     sources: dict[str, str] = {}
     for estimate in estimates:
@@ -123,10 +122,7 @@ def with_origins(text: str, origins: Mapping[str, str]) -> str:
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """Write an estimate as in a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N".
-
-    The range stands for a quantity that is not shown.
-    """
+    """Return an estimate as in a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N" if it is not determined."""
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
         return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
@@ -136,7 +132,7 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def round_uncertainty(half: float) -> tuple[str, int]:
-    """Round an uncertainty up to two digits, as text, and return its decimal places."""
+    """Round an uncertainty up to two digits; return its text and decimal places."""
     digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

@@ -1,4 +1,4 @@
-"""Which estimates the keys of a stage file can take: each within its bound, and all of them together."""
+"""Choose the estimates that the keys of a stage file can take: within their bounds, and consistent with each other."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from friso.stage.stage import numeric_keys
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
 ADDED = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
-"""Keys that a stage file may get though it had none."""
+"""Keys that identification may add to a stage file."""
 
 
 @dataclass(frozen=True)
 class Fitting:
-    """Estimates that can all stand in the stage file.
+    """Estimates that the stage file can take together.
 
-    `follows` holds keys that move along with another (full correlation), and `notes` a sentence for each estimate that
-    cannot stand there as it was made.
+    `follows` has keys that change with another key (full correlation), and `notes` a sentence for each estimate that
+    was changed or dropped.
     """
 
     estimates: tuple[Estimate, ...]
@@ -59,7 +59,7 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
 
 
 def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
-    """Share the whole mass among the masses as in the stage."""
+    """Divide the whole mass among the masses as in the stage."""
     masses = {f"masses.{name}": value for name, value in stage.masses if value is not None}
     method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
     shares = {key: value / sum(masses.values()) for key, value in masses.items()}
@@ -70,10 +70,10 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """Complete an estimate that has one bound by the other bound from earlier knowledge.
+    """Complete an estimate that has one bound by the other bound from prior knowledge.
 
-    Static friction known as "at least" reaches up to the highest ratio to Coulomb friction that is believed of a
-    bearing, unless the stage knows.
+    Static friction known as "at least" reaches up to the highest plausible ratio to Coulomb friction, unless the stage
+    has a value.
     """
     before = stage.uncertain().get(estimate.name)
     if before is not None and not estimate.determined and before.high >= estimate.low and before.low <= estimate.high:
@@ -110,7 +110,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    """The ends that are known, in words."""
+    """Return the known ends in words."""
     return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
 
 
@@ -128,7 +128,7 @@ def _static_above(
 ) -> dict[str, str]:
     """Keep static friction at least as large as Coulomb friction, in `estimates`.
 
-    The less certain of both gives way: it follows the other in the ratio that the stage had.
+    The less certain one follows the other in the ratio of the stage.
     """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
@@ -158,9 +158,9 @@ def _static_above(
 
 
 def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:
-    """Return the estimates with which the stage is one.
+    """Return the estimates with which the stage is valid.
 
-    A key that breaks a rule of the stage file is taken out of `estimates`.
+    A key that breaks a rule of the stage file is removed from `estimates`.
     """
     units = [[key for key in (COULOMB, STATIC) if key in estimates]]
     units += [[key] for key in estimates if key not in (COULOMB, STATIC)]

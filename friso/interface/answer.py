@@ -189,7 +189,7 @@ class Answer:
         return self._shown_by("words", "next_steps", (), files)
 
     def figures(self) -> Sequence[Figure]:
-        """Return the figures, the most telling first."""
+        """Return the figures, the most important one first."""
         return self._shown_by("figures", f"{self._name}_figures", ())
 
     def document(self) -> dict[str, Any]:
@@ -208,7 +208,7 @@ class Answer:
         return dataset_of(self.to_dict())
 
     def document_of_details(self) -> dict[str, Any]:
-        """Return what `--details` adds to the JSON document: numbers that take further work."""
+        """Return what `--details` adds to the JSON document; it may take further computation."""
         return {}
 
     def to_dict(self, details: bool = False) -> dict[str, Any]:

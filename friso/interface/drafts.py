@@ -23,12 +23,14 @@ if TYPE_CHECKING:
     from friso.shown.files import Content
 
 DRAFTS = ".friso-draft-"
-"""How the folder of drafts begins; one that a killed process left behind is deleted by the next."""
+"""Prefix of the folder of drafts.
+
+A folder that a killed process left behind is deleted by the next command."""
 
 _LOCK = "lock"
 
 _LEVELS = 4
-"""How many folders up from a file leftovers are looked for: no command writes deeper below what it is told."""
+"""Number of parent folders in which leftovers are searched; no command writes deeper below its output folder."""
 
 
 class Drafts:

@@ -62,7 +62,7 @@ RoleScales: TypeAlias = Changes
 """Dictionaries, or texts NAME=VALUE: expressions by key, channels by role, units by channel, scales by role."""
 
 _NAMED = 3
-"""Uncertain keys that are named, at most, where there are more."""
+"""Largest number of uncertain keys that a message names."""
 
 LOGGER = logging.getLogger("friso")
 
@@ -104,7 +104,7 @@ def changes_of(changes: Changes) -> dict[str, Any]:
 def read_stage(
     source: StageLike, changes: Changes = None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
 ) -> Stage:
-    """Return a stage with keys overridden, and log what is doubtful about it.
+    """Return a stage with keys overridden, and log doubts about it.
 
     The logger "friso" says if centres of uncertain keys are used, unless `uncertain_too`. It also names the tables that
     the analysis `leaves_out`. Raises InputError.
@@ -154,13 +154,13 @@ def correlations_of(source: StageLike, stage: Stage) -> Correlations:
 
 
 _LONGEST_STEM = 150
-"""Bytes of the part of a name that is taken from another file."""
+"""Longest part, in bytes, that is taken from another file's name."""
 
 
 def stem_of(source: StageLike, usual: str = "stage") -> str:
-    """Return the stem of names of files about a stage: the name of its file without suffix.
+    """Return a stem for names of files about a stage: the name of its file without suffix.
 
-    Bytes that are no text become "_". A long name is cut, so that suffixes still fit.
+    Bytes that are not text become "_". A long name is cut, so that suffixes still fit.
     """
     if isinstance(source, Stage | Mapping):
         return usual
@@ -178,7 +178,7 @@ def tolerance_of(value: str | float) -> float:
 
 
 def text_of(value: str | float, unit: str) -> str:
-    """Write a quantity as a file would have it: a text as it is, a number with its unit."""
+    """Return a quantity as in a stage file: a text unchanged, a number with its unit."""
     return value if isinstance(value, str) else exactly(value, unit)
 
 

@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 LOGGER = logging.getLogger("friso")
 
 STORE_MAKER = "map, a store"
-"""Maker of a folder that is a store and not a folder of files."""
+"""Maker recorded for a folder that is a store rather than a folder of files."""
 
 MARKER = ".friso-output"
-"""The file that records which command made a folder, and which files there are friso's."""
+"""Name of the file that records which command made a folder, and which of its files are friso's."""
 
 OVERWRITE, REPLACES = "--overwrite", "which replaces files of the same name"
-"""The option by which a command writes among files of others, and what that does."""
+"""Option by which a command may write among other files, and its effect in words."""
 
 UNFINISHED = ".friso-unfinished"
-"""The folder in which a long command keeps what is done until all is."""
+"""Name of the folder in which a long command keeps finished parts until it has ended."""
 
 
 class OutputFolder:
@@ -213,10 +213,10 @@ def output_folder(
 
 
 def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
-    """Write files, all of them or none at any moment, and return their paths.
+    """Write files so that at any moment all or none are in place, and return their paths.
 
-    Files that `may_replace` does not name have to be new. Raises FileExistsError if one is not, and another OSError if
-    it cannot be written.
+    Files that `may_replace` does not name must be new. Raises FileExistsError if one is not, and another OSError if it
+    cannot be written.
     """
     with drafts_of(files, progress) as drafts:
         drafts.put_in_place(may_replace)

@@ -1,8 +1,8 @@
 """Define what a folder of `friso/questions/` declares, and what is derived from it.
 
-A question is a function of friso with a command of the same name. Its folder declares a `QUESTION`. From that, from the
-function's signature and its docstring come the command, its options and help, and the entry in `friso --help`. Nothing
-heavy is imported here, because the list of commands is printed before arrays and units are loaded.
+A question is a function of friso with a command of the same name; its folder declares a `QUESTION`. The command, its
+options, its help, and its entry in `friso --help` are derived from the QUESTION, the function's signature and its
+docstring. Nothing heavy is imported here, because the list of commands is printed before arrays and units are loaded.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from friso.platform.installed import load_declared
 from friso.registry import Registry
 
 GROUP = "friso.questions"
-"""The group of entry points in which installed packages name theirs."""
+"""Group of entry points in which installed packages name their questions."""
 
 HUNTS, WHERE, WHY, STOPS, MACHINE, HELP = (
     "Does it hunt?",
@@ -48,9 +48,9 @@ class Choices:
 
 @dataclass(frozen=True)
 class Question:
-    """One question: where its function stands, and how its command takes and shows it.
+    """One question: the location of its function, and how its command takes and shows it.
 
-    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is no number.
+    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is not a number.
     """
 
     package: str
@@ -100,7 +100,7 @@ class Question:
     """Word for the value of a parameter in the help, if the word of its kind says too little."""
 
     runner: str = ""
-    """Module of the function `run` that asks on the command line, where that takes more than showing the answer."""
+    """Module whose function `run` replaces the usual command, where showing the answer is not enough."""
 
     def __post_init__(self) -> None:
         """Check topic and place. Raises ValueError or TypeError."""
@@ -167,10 +167,10 @@ class Question:
 
 
 OF_THE_CALLER = ("folder", "partly", "beside", "keep", "progress")
-"""Parameters that a command gives itself, for where it keeps things."""
+"""Parameters that a command supplies itself, to say where files are kept."""
 
 QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
-"""Every folder of `friso/questions/` declares one, and every package that an installed one names."""
+"""The questions: one for each folder of `friso/questions/`, and those of installed packages."""
 
 
 def function_of(name: str) -> Callable[..., Any]:

@@ -1,6 +1,6 @@
 """Derive JSON Schemas of the stage file and of a specification from their tables.
 
-Editors complete and check files by them, and the reference pages are made from them.
+Editors use the schemas to complete and check files; the reference pages are made from them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def specification_schema() -> Node:
 
 
 SCHEMAS: Mapping[str, Callable[[], Node]] = {"stage": stage_schema, "specification": specification_schema}
-"""The schemas by what they are of."""
+"""Functions that make the schemas, by what they describe."""
 
 
 def _document(cls: type[Section], title: str, described: Mapping[str, str]) -> Node:
@@ -67,7 +67,7 @@ def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node
 
 
 def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping[str, str]) -> Node:
-    """Return the schema of what a key takes."""
+    """Return the schema of the values of a key."""
     for item in metadata:
         if isinstance(item, Table):
             return _one_of(item.pick, path, described)
@@ -119,7 +119,7 @@ def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
 
 
 def _classes(pick: Any) -> list[type[Section]]:
-    """Return the classes that a table may be of."""
+    """Return the classes among which a table chooses."""
     variants = getattr(pick, "__self__", None)
     if isinstance(variants, Controllers):
         return [form for forms in variants.forms.values() for form in forms]

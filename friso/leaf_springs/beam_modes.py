@@ -21,8 +21,8 @@ from friso.leaf_springs.naming import mode_name
 from friso.leaf_springs.settings import LeafSpringSettings
 
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
-"""Coordinates of a node that go together while the leaf is straight, and how many modes between held ends are kept:
-bending, bending in its plane, torsion, stretching."""
+"""Coordinates of a node that couple while the leaf is straight, with the number of modes between held ends: bending,
+bending in its plane, torsion, stretching."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def end_motions(offsets: np.ndarray) -> np.ndarray:
 
 
 def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return what the stage feels of a matrix that acts at all stage ends."""
+    """Return the effect on the stage of a matrix that acts at all stage ends."""
     return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
 
 

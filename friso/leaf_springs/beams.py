@@ -19,7 +19,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import LeafSpringSettings
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
-"""Among the six coordinates of the stage, those that move with the stroke, and the others."""
+"""Coordinates of the stage that move with the stroke, and the others, as slices of six."""
 
 
 @dataclass(frozen=True)

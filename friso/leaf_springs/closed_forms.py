@@ -1,8 +1,8 @@
-"""The mechanism by closed forms, for one or for a million geometries at once.
+"""Evaluate the mechanism by closed forms, for one or for a million geometries at once.
 
 Sources: Soemers, Design Principles for Precision Mechanisms (2010), ch. 2; Awtar, Slocum & Sevincer (2007),
-doi:10.1115/1.2717231, for the deflected leaf; plate.py for what clamps do to a wide leaf.
-Stiffness in N/m, forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
+doi:10.1115/1.2717231, for the deflected leaf; plate.py for the effect of clamps on a wide leaf. Stiffness in N/m,
+forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from friso.leaf_springs import plate
 from friso.leaf_springs.mechanism import Mechanism
 
 SHEAR = 5 / 6
-"""Share of a rectangle's area that carries shear (Timoshenko's coefficient)."""
+"""Fraction of a rectangle's area that carries shear (Timoshenko's coefficient)."""
 
 CLAMPED = 4.730040744862704
 """First root of cos x cosh x = 1: a beam between clamps."""
@@ -104,7 +104,7 @@ def max_stress(mechanism: Mechanism, deflection: Any) -> Any:
 
 
 def shortening(mechanism: Mechanism, deflection: Any) -> Any:
-    """Return by how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
+    """Return how much closer the stage comes to the cart: 3 delta^2/(5 L)."""
     return 3 * deflection**2 / (5 * mechanism.length)
 
 

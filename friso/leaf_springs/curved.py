@@ -31,7 +31,7 @@ def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
 def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
     """Return the stiffness matrix (6, 6) at the end of one deflected leaf.
 
-    The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the share of its length.
+    The leaf is bent by `deflection` [m] into the shape 3 s^2 - 2 s^3, s being the fraction of its length.
     """
     settings = LeafSpringSettings.current()
     nodes, weights = np.polynomial.legendre.leggauss(settings.gauss_points)

@@ -1,4 +1,4 @@
-"""Name modes by the part with the largest share of the kinetic energy."""
+"""Name modes by the part with the largest fraction of the kinetic energy."""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-"""One leaf as the plate that it is: what a beam of the same section lacks.
+"""Model one leaf as a plate, which is stiffer than a beam of equal section.
 
-A leaf bent along its length wants to curl across it (anticlastic curvature), which its clamps forbid; and a twisted
-leaf wants to warp, which they forbid as well. Both make it stiffer than a beam, near the clamps more than away from
-them. The deflection is taken as W(x, y) = f(x) + g(x) (y^2/2 - w^2/24), for twisting W = theta(x) y; Kirchhoff's
-energy is least for a function g (and theta) that solves a linear equation with constant coefficients, so that
-everything has a closed form (Kantorovich's method; Timoshenko & Woinowsky-Krieger, Theory of Plates and Shells,
-1959, Sec. 82 for the energy). With more functions across the width the solution converges (tests/ritz.py); what is
-left of the closed forms then is nearly the same for all leaves. The width is assumed to be many times the thickness.
+A leaf bent along its length curls across it (anticlastic curvature) and a twisted leaf warps, unless clamps prevent it;
+both make the leaf stiffer near the clamps. The deflection is taken as W(x, y) = f(x) + g(x) (y^2/2 - w^2/24), for
+twisting W = theta(x) y; Kirchhoff's energy is least for a function g (and theta) that solves a linear equation with
+constant coefficients, which gives closed forms (Kantorovich's method; Timoshenko & Woinowsky-Krieger, Theory of Plates
+and Shells, 1959, Sec. 82 for the energy). With more functions across the width the solution converges (tests/ritz.py)
+to nearly constant multiples of the closed forms. The width is assumed to be many times the thickness.
 
 Lengths in m, arrays allowed; s runs along the leaf from its middle, from -L/2 to L/2.
 """

@@ -1,4 +1,4 @@
-"""Files that may come from others: regular ones alone are read, whole, up to a size; none has no end."""
+"""Read files that others may have written: only regular ones, and only up to a size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 
 
 
 class LargeFileError(OSError):
-    """A file of `size` [bytes], which is more than was to be read."""
+    """A file of `size` [bytes] exceeds the allowed size."""
 
     def __init__(self, size: int) -> None:
         super().__init__(f"a file of {size / 1e6:.3g} MB")
@@ -20,7 +20,7 @@ class LargeFileError(OSError):
 
 
 def content_of(path: Path, most: int, follow: bool = True) -> bytes:
-    """Read a file of `most` bytes or fewer; a symbolic link is followed if `follow`.
+    """Return the content of a file of at most `most` bytes; follow a symbolic link if `follow`.
 
     Raises LargeFileError, or another OSError where the file cannot be read, or is a device, a pipe or a socket.
     """

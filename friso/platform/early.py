@@ -1,8 +1,7 @@
-"""Prepare the command line before the rest of friso is imported;
-this module needs next to nothing.
+"""Prepare the command line before the rest of friso is imported, with hardly any imports of its own.
 
-A signal that arrives during the import is noted. No module is looked for in the current folder, which may belong to
-someone else. Nothing is done where friso is used as a library.
+A signal during the import is remembered. No module is loaded from the current folder, which may belong to someone else.
+Nothing happens where friso is used as a library.
 """
 
 import os
@@ -10,7 +9,7 @@ import sys
 
 
 def _module() -> str:
-    """Return the module that Python was started with by -m, however written; "" without."""
+    """Return the module that Python was started with by -m; "" without one."""
     if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
         return ""
     for word, following in zip(sys.orig_argv[1:], [*sys.orig_argv[2:], ""], strict=True):
@@ -36,7 +35,7 @@ IS_COMMAND = _IS_MODULE or os.path.splitext(os.path.basename(sys.argv[0]))[0] ==
 """True if this process was started as friso, or as python -m friso."""
 
 came: list[int] = []
-"""The signals that came, in their order."""
+"""The signals received so far, in order."""
 
 
 def _note(number: int, frame: FrameType | None) -> None:

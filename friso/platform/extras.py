@@ -1,4 +1,4 @@
-"""Extras of friso: packages that few commands need, and that are installed where these are asked for."""
+"""Optional dependencies ("extras") that a few commands need, and how to install them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from importlib.util import find_spec
 from friso.errors import InputError
 
 EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo")}
-"""The packages of each extra that commands need, by its name in pyproject.toml. Those of log formats are asked for
-with the log (`friso.identification.logs.libraries`)."""
+"""Packages of each extra that commands need, by the extra's name in pyproject.toml.
+
+For packages of log formats, see `friso.identification.logs.libraries`."""
 
 
 def install(extra: str) -> str:
@@ -17,7 +18,7 @@ def install(extra: str) -> str:
 
 
 def is_installed(package: str) -> bool:
-    """Tell whether a package is there, without importing it."""
+    """Tell whether a package is installed, without importing it."""
     try:
         return find_spec(package) is not None
     except ValueError:  # a module of that name that was made by hand
@@ -25,14 +26,15 @@ def is_installed(package: str) -> bool:
 
 
 def missing(extra: str) -> list[str]:
-    """Return the packages of an extra that are not there."""
+    """Return the packages of an extra that are not installed."""
     return [package for package in EXTRAS[extra] if not is_installed(package)]
 
 
 def need(extra: str, subject: str) -> None:
-    """Refuse what needs an extra that is not installed, before anything is computed.
+    """Check that an extra is installed, before anything is computed.
 
-    Raises InputError, which names the `subject`, a command or an option, and says how to install the extra.
+    Raises InputError if not. The message names the `subject`, a command or an option, and says how to install the
+    extra.
     """
     if packages := missing(extra):
         actual = f"an installation of friso without {' and '.join(packages)}"

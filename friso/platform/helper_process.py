@@ -1,5 +1,7 @@
-"""Processes of Python beside this one, which answer what they are asked, one question after the other. Each ends by
-itself if nothing comes for a while, or with the process that started it."""
+"""Python processes that answer questions of this one, one at a time.
+
+A process ends by itself if no question comes for a while, or when its parent ends.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ PATIENCE = 60.0
 
 
 class HelperProcess:
-    """A process that runs a module, which calls `answer_questions`; `paths` are where it finds modules."""
+    """A process that runs a module, which calls `answer_questions`; `paths` are its import paths."""
 
     def __init__(self, module: str, *arguments: str, paths: Iterable[str]) -> None:
         self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives
@@ -46,7 +48,7 @@ class HelperProcess:
             raise EOFError(str(error)) from None
 
     def end(self) -> str:
-        """End the process; what it has said on standard error."""
+        """End the process, and return its standard error output."""
         with suppress(OSError):
             self._process.communicate()
         self._messages.seek(0)
@@ -55,7 +57,7 @@ class HelperProcess:
         return message
 
     def kill(self) -> None:
-        """End the process, whatever it is at."""
+        """Kill the process at once."""
         self._process.kill()
 
 

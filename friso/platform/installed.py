@@ -1,8 +1,7 @@
-"""Find modules that installed packages add to friso, which they name in entry points,
-by group.
+"""Find modules that installed packages add to friso by entry points, by group.
 
-Names are read from the metadata of packages, without importing any; a module is imported when it is needed. A name that
-is taken, or a module that cannot be used, is reported in one sentence and left out; the rest of friso goes on.
+Names come from the metadata of packages; a module is imported only when it is needed. A name that is taken, or a module
+that cannot be used, is reported in one sentence and skipped.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from friso.errors import InputError
 LOGGER = logging.getLogger("friso")
 
 RENAMED = {"friso.commands": "friso.questions", "friso.functions": "friso.questions"}
-"""Groups of friso 0.2, and the group that takes their place."""
+"""Groups of friso 0.2, and the groups that replace them."""
 
 
 @cache
@@ -84,5 +83,5 @@ def load_declared(group: str, name: str, module: str, attribute: str, kind: Any 
 
 
 def leave_out(error: InputError) -> None:
-    """Say in one sentence why something of another package is left out."""
+    """Report in one sentence why an extension is skipped."""
     LOGGER.warning(f"{error.key} is left out: {error.actual}; expected: {error.expected}")

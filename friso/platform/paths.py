@@ -1,4 +1,4 @@
-"""Paths as they were given: what no system takes for the path of a file is told before it is tried."""
+"""Check paths before use: find what no operating system accepts as a path."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from pathlib import Path
 from friso.platform.system import name_refused
 
 LONGEST_NAME = 255
-"""Bytes of a name at most, on Linux, macOS and Windows alike."""
+"""Longest name in bytes on Linux, macOS and Windows."""
 
 LONGEST_PATH = 1024
-"""Characters of a path at most: macOS takes no more."""
+"""Longest path in characters, as on macOS."""
 
 LONGEST_WRITTEN = 200
-"""Bytes of the name of a file or store that is written, at most: its draft has a longer one."""
+"""Longest name in bytes of a file or store to be written; its draft has a longer name."""
 
 EXPECTED = f"a path with names of at most {LONGEST_NAME} bytes, and of at most {LONGEST_PATH} characters"
 
 
 def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> str:
-    """Return why a path is none of a file or a folder, in words; "" where it may be one."""
+    """Return why a path cannot name a file or a folder; "" if it can."""
     text = os.fspath(path)
     if not text:
         return "an empty path"

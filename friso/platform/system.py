@@ -21,16 +21,21 @@ from typing import TypeVar
 _T = TypeVar("_T")
 
 PATIENCE = 2.0
-"""Time [s] to wait for a file that another program holds open: virus scanners and indexers open every new file."""
+"""Time [s] to wait for a file that another program holds open.
+
+Virus scanners and indexers open every new file."""
 
 
 def _quoted(word: str) -> str:
-    """Return a word of a command in quotes, of KEY=VALUE the value alone."""
+    """Return a word of a command in quotes; of KEY=VALUE, only the value is quoted."""
     return re.sub(r"([\w.]+=)?(.*)", r'\1"\2"', word, count=1, flags=re.DOTALL)
 
 
 def path_of(error: OSError) -> str:
-    """Return the path at which an error arose; of two, the one to be written; "" for none."""
+    """Return the path at which an error arose, "" for none.
+
+    Of two paths, it is the one to be written.
+    """
     return next(iter(_paths_of(error)), "")
 
 
@@ -49,14 +54,16 @@ if sys.platform == "win32":
     }
 
     _REFUSED = {*'<>:"|?*', *map(chr, range(32))}
-    """Characters of no name: a colon would make a hidden stream of a file, or an error."""
+    """Characters that no file name may have on Windows.
+
+    A colon would make a hidden stream of a file, or an error."""
 
     _LONGEST = 247
-    """Characters of a path of a folder that every Windows takes; of a file it takes twelve more."""
+    """Longest path of a folder that every Windows accepts; a file may have twelve characters more."""
 
     @contextmanager
     def interrupts_held() -> Iterator[None]:
-        """Ctrl-C is ignored; processes started meanwhile ignore it for good."""
+        """Ignore Ctrl-C in the `with` block; processes started within ignore it for good."""
         console = ctypes.WinDLL("kernel32")
         console.SetConsoleCtrlHandler(None, True)
         try:
@@ -71,7 +78,7 @@ if sys.platform == "win32":
         timer.start()
 
     def no_signal_later() -> None:
-        """Nothing: the timer ends with the process."""
+        """Do nothing: on this system the timer ends with the process."""
 
     def signals_told() -> int:
         """Return a descriptor from which the numbers of signals can be read as they come,
@@ -81,33 +88,39 @@ if sys.platform == "win32":
         return outlet
 
     def _may_be_held(error: OSError) -> bool:
-        """Tell whether another program may hold what is refused:
-        Windows gives the same reason for what may not be used. A file that was deleted while another program reads it
-        stays in its folder for as long."""
+        """Tell whether another program may hold a file that was refused.
+
+        Windows gives one reason for files in use and for files without permission. A file that is deleted while another
+        program reads it stays in its folder until it is closed.
+        """
         refused = isinstance(error, PermissionError) and any(os.path.exists(path) for path in _paths_of(error))
         return refused or error.errno == errno.ENOTEMPTY
 
     def check_free(path: Path) -> None:
-        """Raises OSError where a file cannot be replaced, since it is read-only, or another program holds it open."""
+        """Raise OSError if a file cannot be replaced.
+
+        The file is read-only, or another program holds it open.
+        """
         if not os.access(path, os.W_OK):
             raise OSError(errno.EROFS, "it is read-only", str(path))
         with suppress(FileExistsError):
             once_free(partial(path.rename, path))  # which changes nothing, but takes the same rights
 
     def name_new_file(draft: Path, path: Path) -> None:
-        """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""
+        """Rename a draft to a path where nothing exists. Raises OSError, FileExistsError if something does."""
         once_free(partial(draft.rename, path))
 
     def rename_folder(folder: Path, path: Path) -> None:
-        """Give a folder another's name and place, in which no file is open. Raises OSError, where there is something
-        but an empty folder too."""
+        """Rename a folder without open files.
+
+        Raises OSError, also if anything but an empty folder is in the way.
+        """
         with suppress(OSError):
             path.rmdir()  # which elsewhere a renamed folder replaces
         once_free(partial(folder.rename, path))
 
     def name_refused(path: Path) -> str:
-        """Return why Windows makes no file, or none of this name, at a path, in words;
-        "" where it does."""
+        """Return why Windows cannot make a file at a path, in words; "" if it can."""
         pure = PureWindowsPath(path)
         for name in pure.relative_to(pure.anchor).parts:
             if name.split(".")[0].rstrip().upper() in _DEVICES:
@@ -117,17 +130,21 @@ if sys.platform == "win32":
         return ""
 
     def shell_word(word: str) -> str:
-        """Return a word of a command as cmd and PowerShell take it: cmd knows no quotes but "...".
-        Within these cmd still replaces %NAME%, and PowerShell $NAME and what follows a backtick: no quotes keep such a
-        word in both."""
+        """Return a word of a command quoted for cmd and PowerShell.
+
+        cmd knows only double quotes. Within double quotes cmd still replaces %NAME%, and PowerShell $NAME and escapes
+        after a backtick. No quotes prevent that in both.
+        """
         if re.fullmatch(r"[\w.:/\\=+-]+", word):
             return word
         return _quoted(re.sub(r'(\\*)(?="|\Z)', r"\1\1", word).replace('"', '\\"'))
 
     @contextmanager
     def closed_pipes_told() -> Iterator[None]:
-        """Writing within to a stream that nobody reads any more raises BrokenPipeError: Windows calls it an invalid
-        argument."""
+        """Raise BrokenPipeError in the block for writing to a stream without a reader.
+
+        Windows itself reports an invalid argument.
+        """
         try:
             yield
         except OSError as error:
@@ -137,7 +154,9 @@ if sys.platform == "win32":
 
     def cause_of(error: OSError) -> str:
         """Return why a file or a folder could not be used.
-        Of a path that is too long Windows says that it is not there."""
+
+        Windows reports a path that is too long as missing.
+        """
         cause, path = error.strerror or str(error), path_of(error)
         if _may_be_held(error):
             return f"{cause}; it may be open in another program"
@@ -147,10 +166,10 @@ if sys.platform == "win32":
         return f"{cause}; a path of {length} characters, which Windows takes only if long paths are enabled"
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Return in words who else than this user and root may write to a file,
-        or replace files in a folder; "" for nobody.
+        """Return in words who, besides this user and root, may write to a file or folder; "" for nobody.
 
-        In a folder with the sticky bit (/tmp), everybody may only replace their own files.
+        For a folder this means replacing its files. In a folder with the sticky bit (/tmp), everybody may only replace
+        their own files.
         """
         return ""
 
@@ -159,11 +178,11 @@ if sys.platform == "win32":
         return True
 
     def is_open_to_others(status: os.stat_result) -> bool:
-        """Tell whether others than this user may read a file, or write to it."""
+        """Tell whether other users may read a file, or write to it."""
         return False
 
     def closed_to_others(folder: Path) -> os.stat_result:
-        """Return the status of a folder, as it is: see `foreign_writers`."""
+        """Return the unchanged status of a folder; see `foreign_writers`."""
         return folder.lstat()
 
 else:
@@ -290,12 +309,12 @@ def open_file(path: Path, flags: int) -> int:
 
 
 def replace_file(draft: Path, path: Path) -> None:
-    """Give a file another's name and place, once no other program holds it. Raises OSError."""
+    """Rename a file over another, once no other program holds that open. Raises OSError."""
     once_free(partial(draft.replace, path))
 
 
 def delete_file(path: Path) -> None:
-    """Delete a file, if it is there, once no other program holds it. Raises OSError."""
+    """Delete a file, if it exists, once no other program holds it open. Raises OSError."""
     once_free(partial(path.unlink, missing_ok=True))
 
 
@@ -309,14 +328,18 @@ def remove_folder(folder: Path) -> None:
 if sys.platform == "linux":
 
     def usable_cores() -> int:
-        """Number of processor cores that this process may use: those it is confined to, and no more than a container's
-        share of time."""
+        """Return the number of processor cores that this process may use.
+
+        It counts the cores that the process is confined to, and at most a container's quota of processor time.
+        """
         return max(1, math.ceil(min(len(os.sched_getaffinity(0)), _share_of_time())))
 
     @cache  # reading it takes half a millisecond, and many short batches ask for it
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
-        """Return how many cores' time the control groups of this process leave it,
-        of either version; infinite without a limit."""
+        """Return the quota of processor time of this process's control groups, in cores.
+
+        Both versions of control groups count. The quota is infinite without a limit.
+        """
         try:
             lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]
         except OSError:
@@ -326,7 +349,7 @@ if sys.platform == "linux":
         return min((_quota(above) for group in groups for above in (group, *group.parents)), default=math.inf)
 
     def _quota(group: Path) -> float:
-        """Cores' time of one group; infinite without a limit ("max", or -1)."""
+        """Return the quota of processor time of one group, in cores; infinite without a limit ("max", or -1)."""
         for names in (("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
             with suppress(OSError, ValueError):
                 quota, period = " ".join((group / name).read_text(encoding="ascii") for name in names).split()
@@ -342,7 +365,7 @@ else:
 
 
 MODES_TELL = sys.platform != "win32"
-"""True if the mode of a folder decides who may read it; on Windows its access list does."""
+"""True if the mode of a folder decides who may read it; on Windows its access list decides."""
 
 MOVES_OPEN_FOLDERS = sys.platform != "win32"
 """True if a folder with an open file can be renamed or deleted: not on Windows."""
@@ -356,14 +379,16 @@ HAS_JIT_LINK = sys.platform != "win32"
 The older one aborts a large process where they lie too far apart (numba/numba#8567, #9001)."""
 
 MOST_PROCESSES = 61 if sys.platform == "win32" else 10_000
-"""Largest number of processes that can be waited for at a time."""
+"""Largest number of processes to wait for at one time."""
 
 LIBRARIES = (
     "install the Microsoft Visual C++ runtime, https://aka.ms/vs/17/release/vc_redist.x64.exe"
     if sys.platform == "win32"
     else "install friso anew in a new environment"
 )
-"""What is to be done where a compiled library, such as llvmlite's, cannot be loaded."""
+"""Advice where a compiled library, such as llvmlite's, cannot be loaded."""
 
 LIMITS_MEMORY = sys.platform == "linux"
-"""True if a process can be held to an amount of memory: Windows has no such limit, and macOS ignores it."""
+"""True if the memory of a process can be limited.
+
+Windows has no such limit, and macOS ignores it."""

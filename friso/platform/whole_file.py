@@ -14,7 +14,7 @@ from typing import BinaryIO
 from friso.platform.system import delete_file, name_new_file, replace_file
 
 PARTIAL = ".partial"
-"""Ends of the names of files being written, friso's and Zarr's, after 32 digits."""
+"""Suffix of files being written, by friso and by Zarr, after 32 digits."""
 
 _PARTIAL = re.compile(rf".*\.[0-9a-f]{{32}}{re.escape(PARTIAL)}")
 FOR_ALL, FOR_USER = 0o666, 0o600
@@ -45,5 +45,5 @@ def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = 
 
 
 def is_partial(file: Path) -> bool:
-    """Tell whether a file was being written, by its name."""
+    """Tell by its name whether a file was still being written."""
     return _PARTIAL.fullmatch(file.name) is not None

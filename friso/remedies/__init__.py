@@ -1,4 +1,4 @@
-"""Find what stops a stage from hunting: settings and isolators, each optimised and verified by cycles."""
+"""Find what stops a stage from hunting: settings and isolators, each optimised, then verified by limit cycles."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""List the remedies: what each one changes, from the least change to the greatest."""
+"""List the remedies with the keys that each one changes, from the smallest change to the largest."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from friso.stage.standstill import settings_of
 from friso.studies.compare.options import linear_flat
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
-"""Range of the width of a notch, as a share of its frequency, and its depth."""
+"""Range of the width of a notch over its frequency, and the depth of the notch."""
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A remedy: its `name`, the stage that it starts from, and the variables that it changes.
+    """A remedy: its `name`, the stage from which it starts, and the variables that it changes, in order.
 
-    Variables are applied in their order. `buys_joint` says that a joint is needed; otherwise only the controller
-    changes. `makes` names the remedy whose joint this one builds from leaf springs.
+    `buys_joint` tells that it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
+    joint this one builds from leaf springs.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Remedy:
     makes: str = ""
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
-        """Return the keys that change at points, which are shares of the ranges (points, variables).
+        """Return the keys that change at points (points, variables), coordinates from 0 to 1 over the ranges.
 
         Each key has an array of shape (points,).
         """
@@ -55,9 +55,9 @@ class Remedy:
         return changed
 
     def values(self, shares: np.ndarray) -> np.ndarray:
-        """Return the numbers that the variables stand for at points, both of shape (points, variables).
+        """Return the numbers of the variables at points, both of shape (points, variables).
 
-        A key has its value in the stage, after all variables that change it, such as the bandwidth.
+        A key has its value after all variables that change it, such as the bandwidth.
         """
         changed = self.changes(shares)
         columns = [changed.get(v.name, v.at(share)) for v, share in zip(self.variables, shares.T, strict=True)]
@@ -65,10 +65,7 @@ class Remedy:
 
     @property
     def verifiable(self) -> bool:
-        """Tell whether cycles can verify the remedy.
-
-        They cannot if a dither keeps the stage moving.
-        """
+        """Tell whether limit cycles can verify the remedy: not if dither keeps the stage moving."""
         return not settings_of(self.stage.flat()).dither
 
     @property
@@ -78,11 +75,11 @@ class Remedy:
 
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
-        """Return a remedy that consists of one finished stage, with nothing to vary."""
+        """Return a remedy that consists of one finished stage, without variables."""
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """Return the stage at shares of the ranges, shape (variables,).
+        """Return the stage at one point, (variables,), with coordinates from 0 to 1.
 
         Numbers are rounded to four digits, unless they are the present ones.
         """
@@ -94,7 +91,7 @@ class Remedy:
 
 
 def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
-    """Return the remedies that a goal allows, the least change first."""
+    """Return the remedies that a goal allows, from the smallest change to the largest."""
     listed: list[Remedy] = []
     if goal.controller:
         listed += [Remedy(BANDWIDTH, stage, (bandwidth_factor(1.0),)), *_gains("gains", stage)]
@@ -138,7 +135,7 @@ def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _reaches(stage: Stage, goal: Goal) -> bool:
-    """Tell whether a faster controller reaches the bandwidth limit with the margin wanted."""
+    """Tell whether a faster controller reaches the bandwidth limit with the required margin."""
     if goal.bandwidth_limit is None or goal.margin > WANTED:
         return False
     flat = stage.flat()
@@ -147,7 +144,7 @@ def _reaches(stage: Stage, goal: Goal) -> bool:
 
 
 def _structures(stage: Stage) -> Iterator[Remedy]:
-    """Return the other structures that the stage's controller can have, each with all its gains."""
+    """Return the other structures of the stage's controller, each with all its gains."""
     flat = stage.flat()
     stands = not pieces(flat, 1)[..., 2:].any()  # the reference jumps, or the stage is released
     for name, changes in controller_of(flat).structures(flat).items():
@@ -172,7 +169,7 @@ def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return each setting against friction that the stage does not have yet, one at a time."""
+    """Return each setting against friction that the stage does not use yet, one at a time."""
     flat = stage.flat()
     if breakaway(flat) <= 0:
         return
@@ -186,7 +183,7 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return an isolator, alone and together with the gains.
+    """Return an isolator, without and with changed gains.
 
     Leaf springs of the stage file are replaced by a joint with plain numbers.
     """

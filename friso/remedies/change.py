@@ -1,4 +1,4 @@
-"""Measure how large a change of a stage is: parts bought, keys changed, and by which factor."""
+"""Measure the size of a change of a stage: parts bought, keys changed, and the factor of the change."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
 PARTS = ("joint.", "flexure.")
-"""Keys of what has to be bought."""
+"""Prefixes of keys that describe parts to be bought."""
 
 
 @dataclass(frozen=True, order=True)
@@ -45,9 +45,9 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
 
 
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
-    """Return by how much a number changes, as the logarithm of a factor.
+    """Return the size of a change of a number, as the logarithm of a factor.
 
-    Upward and downward changes count alike. The result is 0 if there was no number.
+    Upward and downward changes count alike. The result is 0 without a previous number.
     """
     before, after = old.get(key), new.get(key)
     if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:

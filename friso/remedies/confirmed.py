@@ -1,4 +1,4 @@
-"""Confirm a tuned stage: nothing attracts it at its own bandwidth, nor at those near it."""
+"""Confirm that a tuned stage does not hunt at its own bandwidth, nor at bandwidths near it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What attracts a stage at its own bandwidth and at those near it, for the goal's distance from hunting.
+    """Search for hunting of a stage at its own bandwidth and at those near it.
 
-    `hunting` is what attracts the `stage` itself, searched as thoroughly as `friso check` does, and `word` the verdict
-    on its own motion by fewer starts; None if it takes too much computing. `quiet` tells at which of the `factors` of
-    its bandwidth, from below to above, surely nothing attracts. `unstable` are the states in which its loop is
-    unstable.
+    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does, and `word` the
+    verdict on its own motion from fewer starts; None if that takes too much work. `quiet` tells at which of the
+    `factors` of its bandwidth, from below to above, it certainly does not hunt. `unstable` are the states in which its
+    loop is unstable.
     """
 
     stage: Stage
@@ -35,7 +35,7 @@ class Confirmation:
 
     @property
     def certain(self) -> bool:
-        """Tell whether it is certain what attracts the stage at its own bandwidth."""
+        """Tell whether it is certain if the stage hunts at its own bandwidth."""
         return self.hunting.certain
 
     @property
@@ -46,7 +46,7 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return what is not confirmed: names of `friso.questions.tune.present_words.DOUBTS`."""
+        """Return the parts that are not confirmed, as names of `friso.questions.tune.present_words.DOUBTS`."""
         if self.word is None:
             return ("given up",)
         parts = {
@@ -62,8 +62,8 @@ class Confirmation:
 def confirmed(stage: Stage, goal: Goal) -> Confirmation:
     """Judge a stage at its own bandwidth, and at lower and higher ones within the goal's distance.
 
-    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and what
-    attracts there is searched from more starts.
+    The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and each is
+    searched from more starts.
     """
     settings = RemedySettings.current()
     kernels(kernels_to_judge(structure(stage.flat())))

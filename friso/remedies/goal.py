@@ -1,4 +1,4 @@
-"""Define what a tuned machine must achieve, and what may be changed for it."""
+"""Define the goal of tuning, and which parts may change to reach it."""
 
 from __future__ import annotations
 
@@ -12,22 +12,20 @@ from friso.remedies.machines import MoveRange
 from friso.stage import Stage
 
 SHARE = 0.95
-"""Share of the machines, each with a move of its own, that have to meet the goal."""
+"""Fraction of the machines, each with its own move, that must meet the goal."""
 
 
 @dataclass(frozen=True)
 class Goal:
-    """The goal that a tuned machine must meet, and the parts that may be changed for it.
+    """The goal that a tuned machine must meet, and the parts that may change.
 
-    A machine is in position `within` [m] of its reference. The slowest 5 % of machines and moves must be there `settle`
-    [s] after the reference stands still; None means before the run ends. The actuator may use at most `force_limit`
-    [N]; None means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file
-    limits it.
+    A machine is in position `within` [m] of its reference. 95 % of machines and moves must be there `settle` [s] after
+    the reference stands still; None means before the run ends. The actuator may use at most `force_limit` [N]; None
+    means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file limits
+    it.
 
-    The `moves` are those of the stage if none are given.
-
-    All settled states must keep the modulus `margin` and the `distance` from hunting. `controller` and `joint` tell
-    what may be changed.
+    The `moves` are those of the stage if none are given. All settled states must keep the modulus `margin` and the
+    `distance` from hunting. `controller` and `joint` tell which parts may change.
     """
 
     within: float = 1e-6
@@ -42,13 +40,13 @@ class Goal:
     moves: MoveRange | None = None
 
     def moves_of(self, stage: Stage) -> MoveRange:
-        """Return the moves that machines must make: those of the goal, or else of the stage."""
+        """Return the moves that machines must make: those of the goal, or those of the stage without any."""
         return self.moves or MoveRange.of_stage(stage, self.within)
 
     def surely(self, machines: int) -> float:
-        """Return the share of a sample of machines that must meet the goal.
+        """Return the fraction of a sample of machines that must meet the goal.
 
-        It is one standard error above the share wanted of all machines. Otherwise, settings at the edge of what works
-        would pass half of the time.
+        It is one standard error above the fraction required of all machines. Otherwise, half of the settings at the
+        limit would pass.
         """
         return min(1.0, self.share + float(np.sqrt(self.share * (1 - self.share) / machines)))

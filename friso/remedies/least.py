@@ -1,7 +1,4 @@
-"""Find the least change of a controller that still meets the goal.
-
-The search starts from settings that meet it.
-"""
+"""Find the smallest change of a controller that meets the goal, starting from settings that meet it."""
 
 from __future__ import annotations
 
@@ -21,19 +18,19 @@ from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
 LEAST = ": the least change"
-"""Suffix of the name of a remedy with the least change."""
+"""Suffix of the name of a remedy with the smallest change."""
 
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
-"""Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
-just works on the machines of the search, which is not to say on others."""
+"""Powers of the factors of the smallest change that are tried in turn. The smallest change just works on the machines
+of the search, which is not enough for others."""
 
 
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
-    """Return a remedy that varies each changed key of the controller by itself.
+    """Return a remedy that varies each changed key of the controller separately.
 
-    Each key ranges from its value `before` to its `tuned` value, and somewhat beyond. All else is as `tuned`. Returns
-    None if no key of the controller changed.
+    Each key ranges from its value `before` to its `tuned` value, and slightly beyond. Everything else is as `tuned`.
+    Returns None if no key of the controller changed.
     """
     old, new = before.flat(), tuned.flat()
     variables = [
@@ -48,10 +45,7 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """Return a key that varies between two values.
-
-    It also goes a little beyond both, as far as a stage allows.
-    """
+    """Return a key that varies between two values, and slightly beyond as far as a stage allows."""
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
@@ -72,10 +66,10 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
-    """Return the least changes found for a remedy of `least_remedy`, each of shape (variables,).
+    """Return the smallest changes found for a remedy of `least_remedy`, each of shape (variables,).
 
-    Fewer keys come first, then smaller factors. Single keys are tried before all else, because any such change is
-    smaller than a change of several keys. Only changes smaller than `most` are returned (see `change_costs`).
+    Fewer keys come first, then smaller factors. Single keys are tried first, because any such change is smaller than a
+    change of several keys. Only changes smaller than `most` are returned (see `change_costs`).
     """
     yield from of_one_key(search, most)
     if most >= min(2, len(search.remedy.variables)):
@@ -85,10 +79,10 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 
 
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Return changes of a single variable that work, the least first, and all smaller than `most`.
+    """Return changes of a single variable that work, the smallest first, and all smaller than `most`.
 
-    They break no constraint, `enough` of the fresh machines (a share) meet the goal, and nothing attracts the machines.
-    If that share is given, values between those on a grid are not tried, for a first answer with something to spare.
+    They break no constraint, a fraction `enough` of the fresh machines meets the goal, and no machine hunts. With
+    `enough`, values between grid points are not tried: the first answer then has a reserve.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -112,10 +106,10 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
 
 
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Return the points (points, variables) that work on fresh machines.
+    """Return the points (points, variables) that work on fresh machines, of which none hunts.
 
-    `enough` of them, a share, meet the goal by their moves and margins, and nothing attracts the machines. Without it,
-    the share is the least that surely meets the goal.
+    A fraction `enough` of the machines must meet the goal by moves and margins; by default, the least fraction that
+    certainly meets the goal.
     """
     settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough
@@ -125,7 +119,7 @@ def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> 
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
-    """Return how large the changes of points are, shape (points,).
+    """Return the sizes of changes at points, shape (points,).
 
     The integer part counts the keys that change; the fraction grows with the factor.
     """
@@ -139,15 +133,15 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
-    """Return the number by which changes are compared: so many keys, and the logarithm of the factor of all."""
+    """Return the size of a change as a number: of keys, plus a fraction for the logarithm of the whole factor."""
     return np.asarray(keys + logarithm / (1 + logarithm))
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """Return points to start a search from, shape (points, variables).
+    """Return points from which a search starts, shape (points, variables).
 
-    They are the working settings, then settings with some keys restored, wholly or half-way in the logarithm. Fewest
-    changed keys come first.
+    The first are the working settings, then settings with some keys restored, wholly or half-way in the logarithm,
+    fewest changed keys first.
     """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
@@ -156,16 +150,16 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Return the shares of the present numbers and of the working ones, shape (variables, 2)."""
+    """Return the coordinates of the present and of the working numbers, from 0 to 1, (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """Return points to verify, each of shape (variables,), the least change first.
+    """Return points to verify, each of shape (variables,), the smallest change first.
 
-    They are the least change tried that breaks no constraint, the same change taken further, and points between it and
-    the working settings. Other points tried follow. Points that work on fresh machines come before all others.
+    They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
+    the working settings, then other points tried. Points that work on fresh machines come before all others.
     """
     settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points

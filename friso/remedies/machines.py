@@ -1,7 +1,4 @@
-"""Draw machines around a stage, each with a move of its own.
-
-Any change of the stage can be applied to all of them.
-"""
+"""Draw machines around a stage, each with a move of its own, and apply changes of the stage to all of them."""
 
 from __future__ import annotations
 
@@ -25,12 +22,11 @@ from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
 ACCELERATION = "motion.acceleration"
 
 SPREAD_EVENLY = (golden - 1, np.sqrt(2) - 1)
-"""Steps, modulo 1, of sequences that fill the range from 0 to 1 evenly, however short they are: the golden and the
+"""Steps, modulo 1, of sequences that fill the range from 0 to 1 evenly at any length. They are the golden and the
 silver section, whose continued fractions have the smallest terms, 1 and 2 (Kuipers, Niederreiter 1974, Sec. 2.3)."""
 
 ADDED = int.from_bytes(b"joint")
-"""Which of a seed's random numbers decide on a joint that the stage file does not have: they are the second half of
-Philox's key."""
+"""Second half of Philox's key for the random numbers of a joint that the stage file does not have."""
 
 HALF_WIDTHS = 1.959963984540054
 """Standard deviations in the half-width of a 95 % interval."""
@@ -40,9 +36,9 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 @dataclass(frozen=True)
 class MoveRange:
-    """The moves that machines make: from `smallest` to `largest` [m], uniform in the logarithm.
+    """Moves of machines, from `smallest` to `largest` [m], uniform in the logarithm.
 
-    `accelerations` [m/s^2] are drawn likewise; None means that of the stage file.
+    `accelerations` [m/s^2] are drawn likewise; None stands for the acceleration in the stage file.
     """
 
     smallest: float
@@ -51,9 +47,9 @@ class MoveRange:
 
     @classmethod
     def of_stage(cls, stage: Stage, within: float) -> MoveRange:
-        """Return the moves that a stage file states in [moves].
+        """Return the moves in [moves] of a stage file.
 
-        Without them, they go from ten times the tolerance `within` [m] to the file's own move.
+        Without that table, moves go from ten times the tolerance `within` [m] to the file's own move.
         """
         own, stated = float(size(stage.flat())), stage.moves
         if stated is None:
@@ -84,8 +80,8 @@ class MoveRange:
 class Fleet:
     """Machines drawn around a stage, as changes of its keys, all of shape (count,).
 
-    `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves that
-    they make, with `accelerations` [m/s^2] where these differ from that of the file. `moves` says from which range both
+    `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves of the
+    machines, with `accelerations` [m/s^2] if they differ from that of the file. `moves` is the range from which both
     were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
     others. `left_out` counts invalid draws, which were replaced.
     """
@@ -113,7 +109,7 @@ class Fleet:
         return replace(self, ratios=ratios, shifts=shifts, sizes=self.sizes[numbers], accelerations=faster)
 
     def with_moves_from(self, smallest: float) -> Fleet:
-        """Return the machines with moves rescaled to begin at `smallest` [m], in the same order."""
+        """Return the machines with moves rescaled to begin at `smallest` [m], in unchanged order."""
         low, high = np.log([self.moves.smallest, self.moves.largest])
         share = (np.log(self.sizes) - low) / (high - low) if high > low else np.ones(self.count)
         sizes = smallest * (self.moves.largest / smallest) ** share
@@ -122,8 +118,7 @@ class Fleet:
     def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
         """Return flat keys of all machines at all `points`, whose arrays have shape (points,).
 
-        All machines at the first point come first. The controller is tuned for the stage and does not know the drawn
-        values.
+        All machines at the first point come first. The controller is tuned for the stage, not for the drawn machines.
         """
         flat = stage.flat()
         tuned = as_tuned(flat)
@@ -144,7 +139,7 @@ class Fleet:
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Return the ratios of the keys that the stage has.
 
-        Both parts of a mass that was split vary with the whole mass.
+        Both parts of a split mass vary with the whole mass.
         """
         ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
         masses = [key for key in self.ratios if key.startswith("masses.")]
@@ -159,9 +154,9 @@ def draw_fleet(
 ) -> Fleet:
     """Draw machines around a stage as `friso compare` does, each with one of the `moves`.
 
-    The first is the stage file's own, with its own move, or the nearest of the range. The sizes of the others fill the
-    range evenly. Without `moves`, all make the file's own. Joints that the file does not have vary by the default
-    spreads. Raises InputError.
+    The first machine is that of the stage file, with its own move or the nearest one of the range. The other moves fill
+    the range evenly. Without `moves`, all machines make the file's own. Joints that the file does not have vary by the
+    default spreads. Raises InputError.
     """
     own = float(size(stage.flat()))
     moves = moves or MoveRange(own, own)

@@ -1,4 +1,4 @@
-"""Run the method of `friso tune`: optimise each remedy by itself, and verify its best points."""
+"""Run the method of `friso tune`: optimise each remedy separately, and verify its best points."""
 
 from __future__ import annotations
 
@@ -49,19 +49,19 @@ from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
 
 Unmade = Literal["rotary", "mode", "extra", "none"]
-"""Why no leaf springs make a joint: the axis turns; the machine has a parasitic mode of its own, beside which the stage
-cannot have that of leaf springs; or none of the usual sizes bears the stroke."""
+"""Reason why no leaf springs make a joint: the axis turns; the machine already has a parasitic mode, so the stage has
+no room for that of leaf springs; an extra package is missing; or no usual size bears the stroke."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """The outcomes of all remedies for a stage, in the order of the catalogue.
+    """Results of all remedies for a stage, in the order of the catalogue.
 
     `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
     misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
-    margin, and `sensitivities` what the edge of hunting depends on. `relaxed` says what to relax if nothing works, and
-    `relaxed_all` whether all of that was tried; `interrupted` whether the search was ended early, and `least_sought`
-    whether the least change was sought before that.
+    margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells what to relax if nothing works,
+    and `relaxed_all` whether all of that was tried; `interrupted` tells whether the search was ended early, and
+    `least_sought` whether the smallest change was searched before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -87,12 +87,12 @@ class Advice:
 
     @property
     def needed(self) -> bool:
-        """Tell whether the stage as it is fails the goal."""
+        """Tell whether the present stage fails the goal."""
         return bool(self.unmet)
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """Return the least change that works (see `ChangeSize`)."""
+        """Return the smallest change that works (see `ChangeSize`)."""
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:
@@ -112,22 +112,22 @@ class Advice:
 
     @property
     def for_large_moves(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work for large moves alone, the one that serves the smallest moves first."""
+        """Return the remedies that work for large moves only, the one for the smallest moves first."""
         some = (outcome for outcome in self.outcomes if outcome.certainty == "large moves")
         return tuple(sorted(some, key=lambda outcome: outcome.moves_from or 0.0))
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work, the least change first.
-
-        Leaf springs count with the joint that they make.
-        """
+        """Return the remedies that work, the smallest change first; leaf springs follow the joint that they make."""
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
     @property
     def recommended(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that are told in full: the least change, and what settles soonest or the next best."""
+        """Return the remedies that are described in full.
+
+        They are the smallest change, and the one that settles soonest or the next larger change.
+        """
         return _recommended(self.working, self.goal)
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
@@ -136,19 +136,20 @@ class Advice:
 
     @property
     def fastest(self) -> RemedyOutcome | None:
-        """Return the working remedy that settles soonest."""
+        """Return the working remedy with the shortest settling time."""
         return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
-    """Return the settling time [s] of the slowest 5 % with a remedy; infinite if not measured."""
+    """Return the time [s] in which 95 % settle with a remedy; infinite if not measured."""
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
 def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which remedies to tell in full, of those that work, the least change first.
+    """Choose which working remedies to describe in full, given with the smallest change first.
 
-    They are the least change and what settles soonest; if these are the same, the next larger change follows.
+    They are the smallest change and the one that settles soonest; if these are the same, the next larger change
+    follows.
     """
     if not working:
         return ()
@@ -169,7 +170,7 @@ def tune(
     begins: Callable[[], None] = lambda: None,
     answered: Callable[[RemedyOutcome], None] = lambda outcome: None,
 ) -> Advice:
-    """Optimise and verify every remedy that the goal allows, or those named in `chosen`.
+    """Optimise and verify every remedy that the goal allows, or the remedies named in `chosen`.
 
     `begins` is called before the work starts, and `answered` with the outcome of the first remedy. Raises InputError
     for a motion after which nothing has to settle.
@@ -262,8 +263,8 @@ def machines_of_search(
 ) -> Fleet:
     """Return the machines on which searches try settings.
 
-    A machine that is far less robust than nearly all others would count for too many in so small a sample. It is left
-    out, and another one counts twice. Sampling and delay are taken from the stage `drive`.
+    A machine far less robust than nearly all others would weigh too much in so small a sample: it is left out, and
+    another one counts twice. Sampling and delay are taken from the stage `drive`.
     """
     settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
@@ -280,10 +281,10 @@ def machines_of_search(
 
 @dataclass
 class _Session:
-    """The remedies of a stage, tried one after the other, with the `outcomes` so far.
+    """Trial of all remedies of a stage in turn, with the `outcomes` so far.
 
-    `searching` is the search under way, `searches` has all by the names of their remedies. `least_factor` tells that
-    the least bandwidth that works is sought, and `is_least` that it was found. All remedies together may take the work
+    `searching` is the current search, `searches` has all searches by remedy. `least_factor` tells that the smallest
+    bandwidth that works is searched, and `is_least` that it was found. All remedies together may take the work
     `allowed`.
     """
 
@@ -311,9 +312,9 @@ class _Session:
         return any(outcome.certainty == "works" for outcome in self.outcomes)
 
     def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
-        """Try the least factor on the bandwidth that works: the first answer, which further remedies improve on.
+        """Try the smallest factor on the bandwidth that works, as a first answer.
 
-        If there is none, or there are no `others` to improve on it, the factor that settles soonest is sought.
+        If there is none, or there are no `others` to improve on it, the factor that settles soonest is searched.
         """
         search = self._begun(remedy, self.budget.machines)
 
@@ -332,10 +333,10 @@ class _Session:
     def tries_all(
         self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
     ) -> None:
-        """Try remedies, what changes least first; then the least change, and `further` remedies by what became of them.
+        """Try remedies, smaller changes first; then the smallest change, and `further` remedies by the outcomes so far.
 
-        Settings against friction with more keys than what works already changes are left out, and combinations of
-        remedies of which each works alone. Remedies that cannot be verified come last, and only if nothing works.
+        Settings against friction with more keys than a working remedy are left out, and so are combinations of remedies
+        that work alone. Remedies that cannot be verified come last, and only if nothing works.
         """
         verifiable = [remedy for remedy in listed if remedy.verifiable]
         for own in (True, False):
@@ -353,14 +354,14 @@ class _Session:
                 self.tries(remedy)
 
     def _combines(self, remedy: Remedy) -> bool:
-        """Tell whether a remedy varies what several others vary, each of which works alone."""
+        """Tell whether a remedy varies the variables of several others, each of which works alone."""
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
         alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
         return set().union(*alone) == names
 
     def adds_windows(self) -> None:
-        """Find how far each number of what is told first may vary: of the least change, and of what settles soonest."""
+        """Find how far each number of the smallest change, and of the fastest remedy, may vary."""
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes]
         shown = [min(working, key=rank) for rank in (self._size, lambda one: slowest(one, self.goal)) if working]
         for place, outcome in enumerate(self.outcomes):
@@ -370,7 +371,7 @@ class _Session:
                 self.outcomes[place] = replace(outcome, windows=around)
 
     def tries(self, remedy: Remedy) -> None:
-        """Try a remedy for the settings that settle soonest, unless all work that is allowed was done."""
+        """Try a remedy for the settings that settle soonest, unless all allowed work is used up."""
         if self.allowed is not None and self.allowed.left <= 0:
             self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), cut=True, untried=True))
             return
@@ -395,12 +396,12 @@ class _Session:
             self.tries(made)
 
     def tries_less(self) -> None:
-        """Search once for the least change of the present controller.
+        """Search once for the smallest change of the present controller.
 
-        The search starts from the working remedy of this controller that changes most. It starts again from the one
-        that changes least, if that still is the smallest. If no change of this controller works, it starts from the
-        least of the other changes. Keys that stay as they are lead to a further search of the remaining keys; its
-        result is taken if it changes less.
+        The search starts from the working remedy of this controller that changes most, then from the one that changes
+        least, if that still is the smallest. If no change of this controller works, it starts from the smallest of the
+        other changes. Unchanged keys lead to a further search of the remaining keys, whose result is taken if it
+        changes less.
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
@@ -423,9 +424,9 @@ class _Session:
                     self.outcomes[place] = fewer
 
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
-        """Search for the least change of the keys that a working remedy changes.
+        """Search for the smallest change of the keys that a working remedy changes.
 
-        Returns whether it changes any key that can be searched.
+        Returns whether the remedy changes any key that can be searched.
         """
         settings = RemedySettings.current()
         assert outcome.stage is not None
@@ -444,9 +445,9 @@ class _Session:
         return True
 
     def tries_large_moves(self) -> None:
-        """Verify the settings that serve large moves alone, those that serve the smallest moves first.
+        """Verify the settings that serve large moves only, the one for the smallest moves first.
 
-        Where an allowance is used up, the others are left.
+        If an allowance of work is used up, the others are left out.
         """
         largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
         for place, outcome in enumerate(self.outcomes):
@@ -469,7 +470,7 @@ class _Session:
                 self.outcomes[place] = outcome
 
     def interrupted(self) -> None:
-        """Record the best point so far of the remedy under way, which is not verified."""
+        """Record the best point so far of the current remedy, without verification."""
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
@@ -478,7 +479,7 @@ class _Session:
         return change_size(self.stage, outcome.stage)
 
     def _begun(self, remedy: Remedy, machines: int) -> Search:
-        """Start the search for a remedy on so many of the machines."""
+        """Start the search for a remedy on some of the machines."""
         self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
@@ -487,10 +488,7 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Return the first of a few points that is verified.
-
-        If none is, the first that is not sure to work is returned.
-        """
+        """Return the first of a few points that is verified, or else the first of them as not sure to work."""
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
@@ -516,7 +514,7 @@ class _Session:
         self.outcomes[-1] = unsure or none
 
     def makes_leaves(self) -> None:
-        """Size leaf springs for the joints of remedies that are reported in full, and verify them.
+        """Size and verify leaf springs for the joints of remedies that are described in full.
 
         Their search is over, so its work does not limit this.
         """
@@ -526,12 +524,11 @@ class _Session:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
-        """Measure a point on fresh machines, and verify it by its cycles if they meet the goal.
+        """Measure a point on fresh machines, and verify it by its limit cycles if they meet the goal.
 
-        The machines make all moves, or those from `moves_from` [m] on.
-
-        The interval of the share of machines that meet the goal must lie at the share wanted or above. While it leaves
-        that open, further machines are measured.
+        The machines make all moves, or those from `moves_from` [m] on. The interval of the fraction of machines that
+        meet the goal must lie at the required fraction or above; while it leaves that open, further machines are
+        measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -561,10 +558,9 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """Return the settings against friction that came closest to the goal, with the bandwidth.
+    """Return the settings against friction that came closest to the goal, combined with the bandwidth.
 
-    They are tried only if nothing works that changes the controller alone. They change more than the bandwidth does,
-    and bring less than the gains do.
+    They are tried only if no change of the controller alone works.
     """
     settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):
@@ -576,7 +572,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
-    """Return the best point so far of an interrupted search, which is not verified."""
+    """Return the best point so far of an interrupted search, without verification."""
     if not search.tried:
         return outcome
     points = search.points
@@ -598,7 +594,7 @@ def _check_motion(stage: Stage) -> None:
 
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
-    """Estimate how many steps of progress a remedy takes."""
+    """Estimate the number of progress steps of a remedy."""
     settings = RemedySettings.current()
     return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4 + settings.progress_steps
 
@@ -619,7 +615,7 @@ class _Report:
         self.progress, self.total, self.done, self.end = progress, total, 0, 0
 
     def begins(self, steps: int) -> None:
-        """Note that a remedy with so many steps begins."""
+        """Start a remedy with so many progress steps."""
         self.done, self.end = self.end, min(self.end + steps, self.total)
 
     def __call__(self, label: str, steps: int = 1) -> None:

@@ -1,4 +1,4 @@
-"""Find which parts of the goal to relax if no remedy meets it, at most three at a time."""
+"""Find which parts of the goal to relax, at most three together, if no remedy meets it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from friso.stage import Stage
 class RelaxedGoal:
     """A goal relaxed in up to three parts, which a `remedy` then meets.
 
-    It holds the stage, the relaxed parts, and the product of the factors by which they are relaxed.
+    It has the stage, the relaxed parts, and the product of the factors by which they are relaxed.
     """
 
     remedy: Remedy
@@ -37,8 +37,8 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation of each kind, the smallest first.
 
-    The distance from hunting is never relaxed. Machines were surveyed at these points, and nothing attracts them. Where
-    an allowance is used up, remedies that come later are left out.
+    The distance from hunting is never relaxed. Surveyed machines do not hunt at these points. If an allowance of work
+    is used up, remedies that come later are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     with suppress(Exhausted):
@@ -55,7 +55,7 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations of a remedy, of one part each, or else of two or three."""
+    """Return the cheapest relaxations of one part for a remedy, or else those of two or three parts."""
     settings = RemedySettings.current()
     needed = _needed(points, goal)
     far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
@@ -71,10 +71,7 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations of a remedy.
-
-    Some parts are `limited` in how far they may be relaxed.
-    """
+    """Return the cheapest relaxations for a remedy if some parts are `limited` in how far they may be relaxed."""
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
@@ -126,7 +123,7 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
     """Return by which factor the tolerance must be wider for points, shape (points,).
 
-    It is the first of a few factors with which the machines settle, in the time of the goal if it has one.
+    It is the first of a few factors with which the machines settle within the goal's time, if there is one.
     """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
@@ -160,5 +157,5 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
 
 def _time(points: TriedPoints) -> np.ndarray:
-    """Return the settling time within the tolerance, or else within the looser one [s]."""
+    """Return the settling time within the tolerance, or within the looser one if that is not met [s]."""
     return np.where(np.isfinite(points.settling), points.settling, points.looser)

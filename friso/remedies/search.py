@@ -1,4 +1,4 @@
-"""Search the best points of one remedy, and survey what attracts the machines there.
+"""Search the best points of one remedy, and survey whether the machines hunt there.
 
 The search is differential evolution (Storn and Price 1997, doi:10.1023/A:1008202821328), as in SciPy. Whole generations
 are simulated at once in the engine's lanes.
@@ -27,11 +27,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Budget:
-    """The numbers of points, generations and machines that a search may try.
+    """The numbers of points, generations and machines of a search.
 
     `points` counts the points of a generation for each variable. `refined` generations follow around the best points.
     Machines for moves and surveys are fewer than the fresh machines on which an answer is measured. `further` machines
-    are added where these leave the answer open.
+    are added if these leave the answer open.
     """
 
     points: int = 10
@@ -45,16 +45,16 @@ class Budget:
 
 @dataclass(frozen=True)
 class TriedPoints:
-    """Points that were tried, one in each row, with how the machines performed.
+    """Tried points, one in each row, and how the machines performed.
 
-    `shares` of the ranges have shape (n, variables); all other arrays have shape (n,). Settling times [s] are those of
-    the slowest 5 %: within the tolerance, within the looser one, and with the bandwidth lower by the distance from
-    hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the
-    stage file's machine (see `loop_bandwidth`). How near machines are to settling runs from 0 to 1 (see
-    `Search.measured`). `moves_from` [m] is the smallest move such that all machines that move at least so far settle;
-    infinite if the one that moves farthest does not.
+    `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
+    times [s] hold for 95 % of the machines: within the tolerance, within the looser one, and with the bandwidth lower
+    by the distance from hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The
+    bandwidth [Hz] is that of the stage file's machine (see `loop_bandwidth`). The nearness of machines to settling runs
+    from 0 to 1 (see `Search.measured`). `moves_from` [m] is the smallest move from which on all machines settle;
+    infinite if the largest move does not settle.
 
-    Points that are not `whole` were given up early, and the missing moves count as the best possible.
+    Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
 
     shares: np.ndarray
@@ -96,7 +96,7 @@ class TriedPoints:
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
         """Return the numbers of points that serve moves up to the `largest` [m] but not the small ones.
 
-        They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
+        They break no constraint on margin, bandwidth and force. The point for the smallest moves comes first.
         """
         broken = self.broken(goal)
         some = self.moves_from <= largest / RemedySettings.current().large_share
@@ -104,9 +104,9 @@ class TriedPoints:
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
-        """Return what the search minimises: the settling time, or what is `wanted` small instead.
+        """Return the cost of points: the settling time, or the quantity `wanted` small instead.
 
-        For points that break constraints, it is by how much they do.
+        For points that break constraints, it is the amount by which they do.
         """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
@@ -125,7 +125,7 @@ def _most(limit: float | None) -> float:
 
 @np.errstate(over="ignore")  # a force that is not finite counts otherwise
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
-    """Return by what share values exceed a limit."""
+    """Return by which fraction values exceed a limit."""
     return np.maximum(0, values / _most(limit) - 1)
 
 
@@ -133,8 +133,8 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 class Search:
     """The search for the best points of a remedy on `machines`.
 
-    Points that it returns must also work on `fresh` machines. `tried` holds all points so far. `attracted` counts
-    surveyed points at which something attracts the machines, or may. `cut` tells that the search took too much work.
+    Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
+    surveyed points at which machines hunt, or may hunt. `cut` tells that the search took too much work.
     """
 
     remedy: Remedy
@@ -156,23 +156,23 @@ class Search:
 
     @property
     def begun(self) -> TriedPoints:
-        """Return all points that were tried, if any, including those that were given up early."""
+        """Return all points that were tried, if any, including those that were stopped early."""
         tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
         return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
 
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
     ) -> None:
-        """Try points until they improve no more, or until that takes too much work (`cut`).
+        """Try points until they no longer improve, or until that takes too much work (`cut`).
 
-        The search minimises the settling time, or what is `wanted` small: a function from points (points, variables) to
-        numbers (points,). A search of several variables may begin with the points `start`.
+        The search minimises the settling time, or the quantity `wanted` small: a function from points (points,
+        variables) to numbers (points,). A search of several variables may begin with the points `start`.
         """
         with self._allowed(self._work):
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
-        """Try points (points, variables) a few at a time, and return those that break no constraint."""
+        """Try points (points, variables) a few at a time, and return the ones that break no constraint."""
         tuning = RemedySettings.current()
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
@@ -183,10 +183,7 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield points (variables,) to look at further.
-
-        This ends when the next one takes too much work (`cut`).
-        """
+        """Yield points (variables,) for closer inspection, until the next one takes too much work (`cut`)."""
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -200,13 +197,13 @@ class Search:
 
     @property
     def _work(self) -> float:
-        """Return the work that a search may take."""
+        """Return the work allowed for a search."""
         settings = RemedySettings.current()
         return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 
     @contextmanager
     def _allowed(self, work: float) -> Iterator[Allowance]:
-        """Allow so much work in the `with` block; if it does not suffice, the search is `cut`."""
+        """Allow so much work in the `with` block; if it is exceeded, mark the search as `cut`."""
         with allowance(work) as spent:
             try:
                 yield spent
@@ -260,12 +257,12 @@ class Search:
             _evolve(cost, near, ends, self.budget.refined)
 
     def _is_hopeless(self, generation: int) -> bool:
-        """Tell whether no point is anywhere near to settling after some generations."""
+        """Tell whether no point comes near to settling after some generations."""
         tuning, points = RemedySettings.current(), self.points
         return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
-        """Return where between grid points one variable reaches the bandwidth limit from below."""
+        """Return the places between grid points at which one variable reaches the bandwidth limit from below."""
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
         if limit is None:
@@ -288,13 +285,12 @@ class Search:
     ) -> TriedPoints:
         """Measure points on the machines.
 
-        Moves are simulated only if the loop is stable with half of the margin wanted. A remedy of several variables
-        must also not exceed the bandwidth limit by far. Other moves chatter and would take most of the work.
+        Moves are simulated only if the loop is stable with half of the required margin, and a remedy of several
+        variables does not exceed the bandwidth limit by far: other moves chatter and take most of the work.
 
-        A point counts as nearer to settling the more machines settle within the tolerance, the looser one, and the
-        tolerance at the lower bandwidth. The search thus sees progress even before any machine is in position. A
-        point is given up as soon as it must cost more than `most`. The machines that are slowest most often are
-        tried first.
+        A point is nearer to settling the more machines settle within the tolerance, the looser one, and the tolerance
+        at the lower bandwidth, so that progress shows before any machine is in position. A point is stopped as soon as
+        it must cost more than `most`. The machines that are slowest most often are tried first.
         """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
@@ -353,7 +349,7 @@ class Search:
         return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
-        """Tell at which points (points, variables) nothing attracts the machines, shape (points,)."""
+        """Tell at which points (points, variables) no machine hunts, shape (points,)."""
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         least = self.goal.share
@@ -362,10 +358,10 @@ class Search:
         return np.asarray(clear)
 
     def share(self, shares: np.ndarray) -> np.ndarray:
-        """Return the share of fresh machines that meet the goal at points, shape (points,).
+        """Return the fraction of fresh machines that meet the goal by moves and margins at points, (points,).
 
-        Moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the share
-        with enough margin is returned.
+        `shares` has shape (points, variables). If too many machines lack the margin, the fraction with enough margin is
+        returned.
         """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
@@ -378,12 +374,12 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """Yield the best points of shape (variables,) at which nothing attracts the machines.
+        """Yield the best points of shape (variables,) at which no machine hunts.
 
-        Points that settle soonest, or have least of what is `wanted` small, come first. Enough fresh machines must meet
-        the goal. Nearly equal points count as one. After a batch without success, the next points are taken farther
-        away, because the best points are often at the edge of what works. If there are none, the point that serves most
-        fresh machines is yielded.
+        Points that settle soonest, or have the least of the quantity `wanted` small, come first. Enough fresh machines
+        must meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
+        farther away, because the best points are often at the limit of what works. If there are none, the point that
+        serves most fresh machines is yielded.
         """
         settings = RemedySettings.current()
         points = self.begun
@@ -426,10 +422,10 @@ class Search:
             yield from best[self.clear(best)]
 
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
-        """Return better points near one, (variables,), that was taken because better ones failed.
+        """Return better points near a point (variables,), which was taken because better ones failed, the best first.
 
-        Better points had attracted machines, or too few machines met the goal there. New points are drawn around the
-        one, then around the point that is taken next. The best comes first.
+        At the failed points machines hunted, or too few met the goal. New points are drawn around the point, then
+        around the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -467,10 +463,7 @@ def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-    """Return the measure by which points are sorted, shape (n,).
-
-    It is the settling time, or what is `wanted` small instead.
-    """
+    """Return the quantity by which points are sorted, (n,): the settling time, or the quantity `wanted` small."""
     return points.settling if wanted is None else wanted(points.shares)
 
 
@@ -480,10 +473,7 @@ def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the distance of points (points, variables) from the nearest other, shape (points,).
-
-    It is infinite if there are no others.
-    """
+    """Return the distance of points (points, variables) from the nearest other, (points,); infinite without others."""
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 
@@ -496,8 +486,8 @@ def _evolve(
 ) -> None:
     """Run differential evolution from points (points, variables) between `ends`.
 
-    A new point replaces its rival only if it costs less; `cost` is told the rival's cost so that it can give up early.
-    After each generation, whose number it is told, `is_hopeless` may end the search.
+    A new point replaces its rival only if it costs less; `cost` receives the rival's cost so that it can stop early.
+    After each generation, `is_hopeless` receives its number and may end the search.
     """
     settings = RemedySettings.current()
     most: np.ndarray | float = np.inf
@@ -532,7 +522,7 @@ def _evolve(
 def _agree(intermediate_result: Any) -> bool:
     """Tell whether the points of a generation break no constraint and are equally good.
 
-    Points that break constraints may all be equally bad, and the search must then go on.
+    Points that break constraints may all be equally bad; the search must then go on.
     """
     settings = RemedySettings.current()
     costs = intermediate_result.population_energies
@@ -540,7 +530,7 @@ def _agree(intermediate_result: Any) -> bool:
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """Return the first of points that lie so far apart from each other, at most so many."""
+    """Return the first points, at most `most`, that lie at least `apart` from each other."""
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

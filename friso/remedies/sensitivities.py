@@ -1,7 +1,4 @@
-"""Compute which keys of the stage file matter.
-
-These are derivatives of cycle, edge of hunting, settling time and modulus margin.
-"""
+"""Differentiate limit cycle, edge of hunting, settling time and modulus margin by keys of the stage file."""
 
 from __future__ import annotations
 
@@ -40,28 +37,27 @@ from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
 
 RTOL = 1e-11
-"""Relative tolerance of the runs: derivatives are needed to six digits."""
+"""Relative tolerance of the runs, because derivatives need six digits."""
 
 
 NOISE = 100 * RTOL
-"""Share of the time since a run began by which runs with that tolerance may be off."""
+"""Relative error of times in runs with that tolerance."""
 
 ENTERED = STATISTICS.index("inner_exit")
-"""Column of statistics with the time at which a run last entered the band."""
+"""Column of the statistics with the time at which a run last entered the band."""
 
 START = "motion.displacement"
-"""Where a release begins: of the motion's keys the one that is not in the reference."""
+"""The key of the motion that is not part of the reference: the start of a release."""
 
 TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
-"""Where keys stand of which the cycle may depend."""
+"""Prefixes of keys on which the limit cycle may depend."""
 
 
 @dataclass(frozen=True)
 class EdgeDerivatives:
-    """The edge of hunting as a bandwidth [Hz], and its derivatives to the keys [per SI unit].
+    """The edge of hunting as a bandwidth [Hz], and its derivatives by keys [per SI unit], (keys,).
 
-    The derivatives have shape (keys,). For a controller that sets no bandwidth, the edge is a multiple of the present
-    one.
+    For a controller that sets no bandwidth, the edge is a multiple of the present one.
     """
 
     edge: float
@@ -70,11 +66,11 @@ class EdgeDerivatives:
 
 @dataclass(frozen=True)
 class SettlingDerivatives:
-    """The settling `time` [s] of the stage's own move, and its derivatives [s per SI unit].
+    """The settling `time` [s] of the stage's own move, and its derivatives by keys [s per SI unit], (keys,).
 
-    The time runs from the last corner of the reference until the stage stays `within` [m]. Derivatives to the keys have
-    shape (keys,). The time jumps where a turning point crosses the edge of the band. `jump` tells how far the nearest
-    turning point is from that edge, as a share of the band.
+    The time runs from the last corner of the reference until the stage stays `within` [m]. It jumps where a turning
+    point crosses the edge of the band. `jump` is the distance of the nearest turning point from that edge, over the
+    band.
     """
 
     within: float
@@ -85,10 +81,9 @@ class SettlingDerivatives:
 
 @dataclass(frozen=True)
 class MarginDerivatives:
-    """The least modulus margin of all settled states, and its derivatives to the keys [1/SI].
+    """The least modulus margin of all settled states, and its derivatives by keys [1/SI], (keys,).
 
-    The derivatives have shape (keys,). They hold for the state and the frequency at which the loop comes closest to
-    -1.
+    They hold for the state and the frequency at which the loop comes closest to -1.
     """
 
     margin: float
@@ -181,10 +176,7 @@ def sensitivity(
 
 
 def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
-    """Return the derivatives of the edge of hunting and of the margin.
-
-    They are taken to all keys that the equations contain.
-    """
+    """Return the derivatives of the edge of hunting and of the margin by all keys in the equations."""
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat)
     values = np.array([flat[name] for name in names])
@@ -201,8 +193,8 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """Return the stage with equations that contain all given keys.
 
-    An exponent that is a whole number, for example, is otherwise built in. Raises InputError for a key that equations
-    never contain.
+    Without this, an exponent that is a whole number, for example, is built in as a constant. Raises InputError for a
+    key that equations never contain.
     """
     decisive = [name for name in keys if name in decisive_keys(flat)]
     nearby = {**flat, **{name: np.nextafter(flat[name], np.inf) for name in decisive}}
@@ -216,7 +208,7 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """Return the edge's derivatives; without an `edge`, the edge of a check is used."""
+    """Return the derivatives of the edge; without an `edge`, that of a check is used."""
     edge = check_given(stage).judgement.margin if edge is None else edge
     moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
     if edge is None or moved is None:

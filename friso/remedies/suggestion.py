@@ -1,7 +1,4 @@
-"""Suggest an isolator for a rigid stage that hunts.
-
-A few joints are surveyed for a first answer.
-"""
+"""Suggest an isolator for a rigid stage that hunts, from a survey of a few joints."""
 
 from __future__ import annotations
 
@@ -22,14 +19,14 @@ from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
 DAMPING = (0.05, DAMPING_RATIOS[1])
-"""Force of the joints at their strokes, as a share of the static friction, and their damping ratios."""
+"""Force of the joints at their strokes over static friction, and damping ratios."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A joint tried in a rigid stage, and the `stage` with it.
+    """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` tells that nothing attracts the stage at its bandwidth and down to the distance below it. `margin` is the
+    `settles` tells that the stage does not hunt at its bandwidth and down to the distance below it. `margin` is the
     least modulus margin of all settled states. If no joint settles, it is the last one tried.
     """
 
@@ -40,9 +37,9 @@ class Suggestion:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def suggestion(stage: Stage) -> Suggestion | None:
-    """Return the shortest of a few strokes with which an isolator settles a stage.
+    """Return the isolator with the shortest of a few strokes that settles a stage.
 
-    The joint is the softest that does not move the cart. Returns None for a stage that has a joint or can have none.
+    It is the softest joint that does not move the cart. Returns None for a stage that has a joint or cannot have one.
     """
     settings = RemedySettings.current()
     if stage.joint:
@@ -74,9 +71,9 @@ def suggestion(stage: Stage) -> Suggestion | None:
 
 
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
-    """Return where stroke [m], force and damping ratio lie in the ranges of a joint remedy.
+    """Return the coordinates, from 0 to 1, of stroke [m], force and damping ratio of a joint remedy.
 
-    0 is the low end, 1 the high end, on a logarithmic scale. The force is `RemedySettings.suggested_force`.
+    The scale is logarithmic. The force is `RemedySettings.suggested_force`.
     """
     settings = RemedySettings.current()
     wanted = (stroke, settings.suggested_force, damping)

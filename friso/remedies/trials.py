@@ -24,15 +24,15 @@ from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
 
 RANKING = 1e-5
-"""Relative tolerance of the moves that are told, and of those by which settings are compared: half the steps, and a
-settling time that a thousandth is wrong, as a rule a tenth of that."""
+"""Relative tolerance of the moves by which settings are compared. It halves the steps; settling times are off by a
+thousandth, usually by a tenth of that."""
 
 
 @dataclass(frozen=True)
 class Moves:
     """Moves of points on machines, all arrays of shape (points, machines).
 
-    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`). A
+    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`); a
     second time holds for the looser tolerance. Both are infinite if the stage is not in position when the reference
     leaves or the run ends. `force` [N] is the largest force.
     """
@@ -42,12 +42,12 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """Return the settling time [s] of all but the slowest machines of each point, shape (points,)."""
+        """Return the settling time [s] that a fraction of the machines keeps at each point, (points,)."""
         return quantile(self.settling, share)
 
 
 def quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """Return for each row the least value that so large a share of it does not exceed."""
+    """Return for each row the least value that a given fraction of the row does not exceed."""
     ordered = np.sort(values, axis=-1)
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 
@@ -56,7 +56,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """Simulate the moves of points, given as shares (points, variables) of a remedy's ranges.
+    """Simulate the moves of points, with coordinates (points, variables) from 0 to 1 over a remedy's ranges.
 
     The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
     """
@@ -85,10 +85,10 @@ def timing(drive: Stage) -> dict[str, float]:
 def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
-    """Return the least modulus margin of the limit cases, shape (points, machines).
+    """Return the least modulus margin of the limit cases, shape (points, machines); 0 if one is unstable.
 
-    An unstable case counts as 0. Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by
-    the factor `slower`. Controllers with other gains at standstill get the smaller margin of both sets.
+    Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by the factor `slower`.
+    Controllers with other gains at standstill get the smaller margin of both sets.
     """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
@@ -99,10 +99,10 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """The result of a survey of what attracts machines, with arrays of shape (points, machines).
+    """Result of a survey for hunting of machines, with arrays of shape (points, machines).
 
-    `attracts` tells whether hunting attracts a machine at its bandwidth or down to the distance below it. Further
-    arrays tell whether simulations decided that, and whether it is `certain` because nothing else can exist.
+    `attracts` tells whether a machine hunts at its bandwidth or down to the distance below it. Further arrays tell
+    whether simulations decided that, and whether it is `certain` because no other attractor can exist.
     """
 
     attracts: np.ndarray
@@ -111,7 +111,7 @@ class Attraction:
 
     @classmethod
     def none(cls, machines: int) -> Attraction:
-        """Return one point at which nothing attracts so many machines."""
+        """Return one point at which none of so many machines hunts."""
         return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
 
     def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
@@ -123,12 +123,12 @@ class Attraction:
 
     @property
     def clear(self) -> np.ndarray:
-        """Tell which machines have nothing that attracts, as far as simulations reach."""
+        """Tell which machines do not hunt, as far as simulations show."""
         return ~self.attracts & self.decided
 
     @property
     def surely_clear(self) -> np.ndarray:
-        """Tell which machines surely have nothing that attracts."""
+        """Tell which machines certainly do not hunt."""
         return ~self.attracts & self.certain
 
 
@@ -141,13 +141,12 @@ def attraction(
     enough: float | None = None,
     at_once: bool = False,
 ) -> Attraction:
-    """Survey what attracts the machines at points.
+    """Survey whether the machines hunt at points.
 
     Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance: the lowest first,
-    where most machines are attracted, or all `at_once`, which saves time where nearly all are clear. A machine for
-    which a bandwidth stays undecided is not surveyed further, nor are the machines of a point at which fewer than
-    `enough` of them (a share) are clear. Simulations start from many states; closed orbits have to confirm the final
-    answer.
+    where most machines hunt, or all `at_once`, which is faster where hardly any does. An undecided bandwidth ends the
+    survey of a machine, and a point with fewer than the fraction `enough` of quiet machines ends with it. Simulations
+    start from many states; closed orbits confirm the final answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

@@ -1,7 +1,4 @@
-"""Define what an optimiser may change of a stage.
-
-These are numbers on logarithmic scales, and the keys that follow from them.
-"""
+"""Define the variables of an optimiser: numbers on logarithmic scales, and the keys that follow from them."""
 
 from __future__ import annotations
 
@@ -17,21 +14,21 @@ from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
 KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
-"""From the flat keys so far and the values of a variable to the keys that change."""
+"""Function from the flat keys so far and the values of a variable to the keys that change."""
 
 BANDWIDTH = "bandwidth"
-"""Name of the variable that makes a controller faster as a whole."""
+"""Name of the variable that makes the whole controller faster."""
 
 
 DAMPING_RATIOS = (0.01, 0.3)
-"""Damping ratios of the stage on its joint that are tried."""
+"""Range of damping ratios of the stage on its joint."""
 
 
 @dataclass(frozen=True)
 class Variable:
     """A number between `low` and `high` (SI) on a logarithmic scale.
 
-    Close to the `present` number it takes exactly that; NaN means that there is none.
+    Close to the `present` number it takes exactly that value; NaN means that there is none.
     """
 
     name: str
@@ -41,13 +38,13 @@ class Variable:
     present: float = float("nan")
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """Return the values at shares of the range."""
+        """Return the values at coordinates from 0 to 1 over the range."""
         settings = RemedySettings.current()
         value = np.asarray(self.low * (self.high / self.low) ** share)
         return np.where(np.abs(share - self.share(self.present)) < settings.snap_share, self.present, value)
 
     def share(self, value: float) -> float:
-        """Return the share of the range at which the variable has a value."""
+        """Return the coordinate, from 0 to 1 over the range, of a value."""
         return float(np.log(value / self.low) / np.log(self.high / self.low))
 
 
@@ -57,7 +54,7 @@ def of_key(key: str, low: float, high: float, present: float = float("nan")) -> 
 
 
 def bandwidth_factor(present: float = float("nan")) -> Variable:
-    """Return the speed of the whole controller as a factor of the present one."""
+    """Return the speed of the whole controller as a variable, in units of the present speed."""
     settings = RemedySettings.current()
     return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
 

@@ -1,4 +1,4 @@
-"""Verify remedies by cycles, and on machines that the optimiser did not see."""
+"""Verify remedies by limit cycles, and on machines that the optimiser did not see."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from friso.studies.compare.options import linear_flat
 from friso.studies.compare.statistics import quantile_interval
 
 ONE = np.zeros((1, 0))
-"""The shares of the one point of a remedy without variables."""
+"""Coordinates of the one point of a remedy without variables."""
 
 Certainty = Literal["works", "large moves", "unsure", "given up", "does not work"]
 
@@ -38,11 +38,11 @@ Certainty = Literal["works", "large moves", "unsure", "given up", "does not work
 class Performance:
     """Measurements of a stage on machines, in rows of one point.
 
-    They are its `moves`, the modulus margins, and what attracts the machines. `own_margin` is the least modulus margin
-    of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. For `further`
-    machines, shape (n,), it is only known whether they meet the whole goal. `sizes` [m] are the moves of all machines,
-    the further ones last, which were drawn from the range `moves_drawn`. Until the performance `is_surveyed`, nobody
-    knows which machines hunt.
+    They are its `moves`, the modulus margins, and whether the machines hunt. `own_margin` is the least modulus margin
+    of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. Of `further` machines,
+    shape (n,), only whether they meet the whole goal is stored. `sizes` [m] are the moves of all machines, the further
+    ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which machines
+    hunt.
     """
 
     moves: Moves
@@ -61,11 +61,11 @@ class Performance:
         return self.margin.size + self.further.size
 
     def slowest(self, goal: Goal) -> float:
-        """Return the settling time [s] of the slowest 5 % of machines and moves; infinite if never."""
+        """Return the time [s] in which 95 % of machines and moves settle; infinite if they do not."""
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
-        """Return the 95 % interval of the settling time of the slowest 5 %, for machines as a sample."""
+        """Return the 95 % interval of the time in which 95 % settle, for machines as a sample."""
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
@@ -105,7 +105,7 @@ class Performance:
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
         """Return the smallest and largest move [m] between which the goal holds; None if there are none or none known.
 
-        Of the moves next to either end, as many as one likes, at least the share wanted meet the goal.
+        Of any number of moves next to either end, at least the required fraction meets the goal.
         """
         order = np.argsort(self.sizes, kind="stable")
         if self.moves_drawn is None or not order.size or not self.is_surveyed:
@@ -131,10 +131,10 @@ class Performance:
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
-        """Return the performance with a survey of what attracts the machines that meet the rest of the goal.
+        """Return the performance with a survey for hunting of the machines that meet the rest of the goal.
 
-        A few machines are surveyed first. If something attracts so many of them that too few can meet the goal, the
-        others are left out: the share is that of fewer machines then.
+        A few machines are surveyed first. If so many of them hunt that too few can meet the goal, the others are left
+        out: the fraction is then that of fewer machines.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
@@ -145,7 +145,7 @@ class Performance:
     def _surveyed(
         self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
     ) -> Performance:
-        """Return the performance with a survey of some machines by their numbers, of those that meet the rest."""
+        """Return the performance with a survey of numbered machines that meet the rest of the goal."""
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:
             return self
@@ -153,7 +153,7 @@ class Performance:
         return replace(self, attraction=self.attraction.of_some(surveyed, some))
 
     def _first(self, count: int) -> Performance:
-        """Return what was measured on the first machines alone."""
+        """Return the measurements of the first machines only."""
         moves = Moves(*(column[:, :count] for column in vars(self.moves).values()))
         attracted = Attraction(*(column[:, :count] for column in vars(self.attraction).values()))
         margin, sizes = self.margin[:, :count], self.sizes[:count]
@@ -170,8 +170,8 @@ class Performance:
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     """Return the first and last place of the run of places that best meets the goal.
 
-    In every part of it that touches one of its ends, at least the `share` wanted meets the goal. Returns None if no
-    run is long enough to show such a share.
+    Every part of the run that touches one of its ends meets the goal with at least the required fraction. Returns None
+    if no run is long enough to show that.
     """
     if meets.all():
         return 0, len(meets) - 1
@@ -184,17 +184,16 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class RemedyOutcome:
-    """The outcome of a remedy: its best `stage`, how it performs, and whether it surely works.
+    """The outcome of a remedy: its best `stage`, the performance, and whether it surely works.
 
-    `stage` is None if none was found. `doubts` are the
-    reasons why it is not sure to work; it works if there are none. `windows` tell how far each number may vary.
+    `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; without any, it works.
+    `windows` give how far each number may vary. `confirmation` is the search for hunting of the stage itself; None if
+    too many machines miss the goal.
 
-    `confirmation` says what attracts the stage itself; None if too many machines miss the goal.
-
-    `points` are all settings tried; `attracted` counts those given up because something attracted machines. `shares`
-    locate the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that others
-    had taken all of it. `moves_from` [m] is the smallest move of those for which the stage was verified, if it serves
-    large moves alone.
+    `points` are all settings tried; `attracted` counts the ones dropped because machines hunted. `shares` are the
+    coordinates of the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that
+    others had taken all of it. `moves_from` [m] is the smallest move for which the stage was verified, if it serves
+    large moves only.
     """
 
     remedy: Remedy
@@ -213,9 +212,9 @@ class RemedyOutcome:
 
     @property
     def certainty(self) -> Certainty:
-        """Return whether the remedy works: surely, unsurely, or not at all.
+        """Return whether the remedy works: surely, not surely, or not at all.
 
-        A search without result may also have been given up.
+        A search without result may also have run out of work.
         """
         if self.interrupted:
             return "unsure"
@@ -230,7 +229,7 @@ class RemedyOutcome:
 
 @np.errstate(all="ignore")
 def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure the moves and margins of a stage on machines; what attracts these is not surveyed (see `surveyed`)."""
+    """Measure the moves and margins of a stage on machines, without a survey for hunting (see `surveyed`)."""
     flat = stage.flat()
     return Performance(
         **_measured(stage, machines, goal, drive),
@@ -242,7 +241,7 @@ def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performan
 
 
 def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[str, Any]:
-    """Return moves and margins on machines, and that nothing has been surveyed yet, by field of `Performance`."""
+    """Return moves and margins on machines by field of `Performance`, marked as not surveyed yet."""
     remedy = Remedy.settled_on("", stage)
     return {
         "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),
@@ -254,8 +253,8 @@ def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[s
 def _stiffness(flat: Mapping[str, Any]) -> float:
     """Return the loop's stiffness [N/m] against a load on the stage, before the integral acts.
 
-    Gains are those at standstill. A joint does not reduce it, because actuator and sensor are on the stage. A
-    transmission does, if the position is measured at the motor.
+    Gains are those at standstill. A joint does not reduce the stiffness, because actuator and sensor are on the stage.
+    A transmission does, if the position is measured at the motor.
     """
     proportional, _ = slow_gains(gain_states(flat)[-1])
     if flat.get("encoder.position") == "motor":
@@ -264,7 +263,7 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
 
 
 def checked(stage: Stage) -> Case:
-    """Check a stage as `friso check` does, with less work: it tells the edge of hunting if that is soon located."""
+    """Check a stage as `friso check` does, with less work; the edge of hunting is included if it is soon located."""
     try:
         with allowance(RemedySettings.current().present_check_work):
             return check_given(stage)
@@ -273,9 +272,9 @@ def checked(stage: Stage) -> Case:
 
 
 def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return why the stage itself is not sure to work: its verdicts, bandwidth and margin.
+    """Return why the stage itself is not sure to work: verdicts, bandwidth, margin.
 
-    They are names of `friso.questions.tune.present_words.DOUBTS`.
+    The reasons are names of `friso.questions.tune.present_words.DOUBTS`.
     """
     rounded = 1 + RemedySettings.current().rounded_share
     listed = [*confirmation.doubts]

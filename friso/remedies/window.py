@@ -1,4 +1,4 @@
-"""Find the range of each number in which an answer holds, all others as tuned."""
+"""Find the range of each number in which an answer holds while all other numbers stay as tuned."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from friso.remedies.settings import RemedySettings
 class VariableWindow:
     """The range from `low` to `high` of a variable around its tuned `value` in which machines meet the goal.
 
-    All three are in SI, or factors. All else is as tuned. `open_below` and `open_above` tell that the range reaches an
-    end of the search.
+    All three are in SI, or factors; everything else is as tuned. `open_below` and `open_above` tell that the range
+    reaches an end of the search.
     """
 
     name: str
@@ -32,9 +32,8 @@ class VariableWindow:
 def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     """Return the windows around a point, shape (variables,), on the machines of the search.
 
-    Moves and margins are tried on a grid, and the ends are refined by bisection. The ends are then drawn in until
-    nothing attracts the machines there. Returns None if the point itself misses the goal on these machines, or takes
-    too much work.
+    Moves and margins are tried on a grid, and the ends are refined by bisection, then drawn in until no machine hunts
+    there. Returns None if the point itself misses the goal on these machines, or takes too much work.
     """
     settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
@@ -93,21 +92,21 @@ def _halve(
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Tell whether points meet the goal by moves and margins if one variable each is moved.
 
-    `numbers` (n,) select the variables, and `places` (n,) are their new shares.
+    `numbers` (n,) select the variables, and `places` (n,) are their new coordinates.
     """
     worst = RemedySettings.current().worst_time  # points that break a constraint cost more
     return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether nothing attracts the machines at points with one variable each moved."""
+    """Tell whether no machine hunts at points with one variable each moved."""
     if not len(places):
         return np.ones(0, bool)
     return search.clear(_moved(shares, numbers, places))
 
 
 def _moved(shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return points with one variable each, of a number (n,), moved to another place (n,)."""
+    """Return points with one variable each, numbered `numbers` (n,), moved to `places` (n,)."""
     tried = np.repeat(shares[None], len(places), axis=0)
     tried[np.arange(len(places)), numbers] = places
     return tried

@@ -1,4 +1,4 @@
-"""The types of arguments, by their annotations: one of another type is an InputError that names the argument."""
+"""Check the types of arguments by their annotations; a wrong type gives an InputError that names the argument."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ TEXT_KINDS = {
     "ClaimName": "CLAIM",
     "Address": "ADDRESS",
 }
-"""Annotations of texts, and what stands for the text on the command line."""
+"""Annotations of texts, and the placeholder of each on the command line."""
 
 PAIR_KINDS = {
     "Links": "KEY=EXPRESSION",
@@ -46,10 +46,10 @@ PAIR_KINDS = {
     "ChannelUnits": "CHANNEL=UNIT",
     "RoleScales": "ROLE=SCALE",
 }
-"""Annotations of dictionaries, and what stands for a pair on the command line."""
+"""Annotations of dictionaries, and the placeholder of a pair on the command line."""
 
 QUANTITY_KINDS = ("LengthLike", "TimeLike", "ForceLike", "FrequencyLike", "RatioLike")
-"""Annotations of numbers with a unit: "1 um" or a number in SI."""
+"""Annotations of numbers with a unit: "1 um", or a number in SI."""
 
 
 def _is_text(value: Any) -> bool:
@@ -73,7 +73,7 @@ def _is_whole(value: Any) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Tell whether a value is one number that a float can be."""
+    """Tell whether a value is a single number that fits a float."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return False
     try:
@@ -92,10 +92,10 @@ def _are_numbers(value: Any) -> bool:
 
 
 MOST_INT = 10**18
-"""Whole numbers are smaller, whatever they count."""
+"""Bound for whole numbers, whatever they count."""
 
 MOST_SEED = 2**31 - 1
-"""The largest seed that every generator of random numbers takes."""
+"""Largest seed that every random number generator accepts."""
 
 
 @dataclass(frozen=True)
@@ -205,9 +205,9 @@ _PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "It
 
 
 def alternatives(annotation: str) -> list[str]:
-    """Split an annotation at its outer bars: "int | None" has two parts.
+    """Split an annotation at its outer bars.
 
-    "Iterable[str | None]" has one.
+    "int | None" has two parts, "Iterable[str | None]" has one.
     """
     parts, depth = [""], 0
     for sign in annotation:
@@ -270,9 +270,9 @@ def _read_stage(source: Any) -> Stage:
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
-    """Raise InputError for an argument of none of the kinds, or for a path that is none.
+    """Raise InputError for an argument of none of the kinds, or for an unusable path.
 
-    `sets`: keys can be set, for which a dictionary in another place was meant.
+    With `sets`, keys can be set, and a dictionary was meant for that.
     """
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))

@@ -15,7 +15,7 @@ from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
 
 
 def _falls(flat: Mapping[str, Any]) -> Any:
-    """Tell whether static friction is at least Coulomb friction, under the conditions.
+    """Tell whether static friction is at least Coulomb friction under the operating conditions.
 
     It is true for laws that do not have both.
     """

@@ -22,23 +22,24 @@ KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
 """Stage-file keys that every controller has."""
 
 OF_ANY_FORM = ("kind", "force_limit", "anti_windup", "anti_windup_time", "filters")
-"""Keys of a controller that stay where it is put into another form."""
+"""Keys of a controller that are unchanged when it is put into another form."""
 
 AntiWindup = Literal["none", "clamp", "back_calculation"]
-"""What integrators do while the force is at its limit: wind up on; rest while they would drive it further; or unwind in
-proportion to what is cut off."""
+"""Behaviour of integrators while the force is at its limit.
+
+They continue to wind up; stop where they would drive the force further; or unwind in proportion to the excess force."""
 
 DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
-"""Where a stage file has a limit and does not tell."""
+"""Anti-windup of a stage file that has a limit and does not say."""
 
 BACK_CALCULATION: AntiWindup = "back_calculation"
 
 SYMBOLS = {"force_limit": ("limit of the force", "Fmax"), "integral_limit": ("limit of the integrals", "Imax")}
-"""What keys of every controller are called in a table of gains, and their symbols."""
+"""Names and symbols, in a table of gains, of keys that every controller has."""
 
 
 class Gain(NamedTuple):
-    """A number for a drive: what it is, its symbol, its value [SI] and its unit on a linear axis."""
+    """A number to enter into a drive: name, symbol, value [SI], and unit on a linear axis."""
 
     name: str
     symbol: str
@@ -47,10 +48,11 @@ class Gain(NamedTuple):
 
 
 class ControllerSection(AgainstFriction):
-    """Base of the controllers: each declares its keys, `kind: Literal["name"]`, and its blocks.
+    """Base of the controllers.
 
-    It also declares everything else that friso asks of a controller; no other module reads its keys. Several forms of
-    one kind, distinguished by their keys, derive from the class that declares the kind.
+    Each declares its keys, `kind: Literal["name"]`, its blocks, and everything else that friso asks of a controller; no
+    other module reads its keys. A kind may have several forms, distinguished by their keys, which derive from the class
+    that declares the kind.
     """
 
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
@@ -59,32 +61,37 @@ class ControllerSection(AgainstFriction):
     filters: Annotated[Rows, FILTER_ARRAY] = Rows()
 
     feeds_back: ClassVar[Literal["position", "velocity"]] = "position"
-    """What the filters of the feedback path act on."""
+    """The signal on which filters of the feedback path act."""
     bandwidth_key: ClassVar[str | None] = None
-    """The numeric key [Hz] that states the bandwidth, where the controller has one."""
+    """The key [Hz] that states the bandwidth, if the controller has one."""
     bandwidth_name: ClassVar[str] = "crossover"
-    """What that key is, in a sentence."""
+    """Name of the bandwidth key in a sentence."""
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({})
-    """Names of the keys to the powers of the factor by which they change in a controller that is so many times faster,
-    all its poles and zeros being scaled."""
+    """Exponents by key, for a controller that becomes faster by a factor.
+
+    Each key is multiplied by the factor to the power of its exponent; all poles and zeros are then multiplied by the
+    factor."""
     shaped_by: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
-    """Names of the keys that shape a controller without making it faster, to the ranges in which they are tuned."""
+    """Tuning ranges of the keys that shape a controller without making it faster."""
     loop_gain: ClassVar[tuple[str, ...]] = ()
-    """Names of the keys in proportion to all of which the gain of the loop goes."""
+    """Names of the keys to whose product the loop gain is proportional."""
     decisive: ClassVar[tuple[str, ...]] = ()
-    """Names of the numeric keys on which `variant` and `integrates` depend, by being zero, for instance."""
+    """Names of the numeric keys on which `variant` and `integrates` depend, for example by being zero."""
     recognised_by: ClassVar[tuple[str, ...]] = ()
-    """Names of the keys, any of which distinguishes this form from others of its kind; of these one has none."""
+    """Names of the keys that identify this form among others of its kind.
+
+    One of them in a table is enough; a form without any is the default."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """The shares of the force and what they are called in plots."""
+    """Labels in plots of the terms of the force."""
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
-    """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
+    """Names of keys on the axes of maps, where the key itself is not clear enough."""
     usual: ClassVar[Mapping[str, tuple[float, float, str, tuple[str, ...]]]] = MappingProxyType({})
-    """Names of keys to the values that positioning stages have, from and to, their unit, and those in which they are
-    told; of gains, in N of something, per kilogram that they move."""
+    """Usual values of keys in positioning stages.
+
+    For each key: the ends of the range, their unit, and the units in which values are reported. Gains are per kilogram
+    of moving mass."""
     symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
-    """Names of keys to what they are called in a table of gains, and their symbols, where the name itself will not
-    do."""
+    """Names and symbols of keys in a table of gains, where the key itself is not clear enough."""
 
     @model_validator(mode="after")
     def _anti_windup_is_whole(self) -> Self:
@@ -112,7 +119,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Hashable:
-        """Return the further choices on which the equations depend, such as terms that are absent."""
+        """Return further choices on which the equations depend, such as absent terms."""
         return None
 
     @classmethod
@@ -130,12 +137,12 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def stiffness(cls, blocks: Any, variant: Any) -> Any:
-        """Proportional stiffness of the loop [N/m], from which the scales of the motion are taken."""
+        """Return the proportional stiffness of the loop [N/m], which scales the motion."""
         raise NotImplementedError
 
     @classmethod
     def declare(cls, measured: Any, blocks: Any, variant: Any) -> Mapping[str, Any]:
-        """Return the parts of the force [N], each a signal made by `blocks` from what is `measured`.
+        """Return the terms of the force [N], each a signal made by `blocks` from the `measured` inputs.
 
         See `friso.equations.blocks`.
         """
@@ -152,7 +159,10 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the numbers for a drive: keys that are not 0, then those of every controller."""
+        """Return the numbers to enter into a drive.
+
+        They are the keys that are not 0, then those common to every controller.
+        """
         fields = numeric_fields(cls)
         names = sorted(fields, key=lambda name: name in ControllerSection.model_fields)
         return tuple(
@@ -168,15 +178,15 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the way from the error to the demanded force in characters.
+        """Draw the path from the error to the demanded force in text characters.
 
-        Without more it is a box (`friso.drives.diagram.Canvas`).
+        By default it is a box (`friso.drives.diagram.Canvas`).
         """
         canvas.box(flat[KIND])
 
     @classmethod
     def note(cls, flat: Mapping[str, Any]) -> str:
-        """Return what a verdict on a stage with this controller takes for granted, in a sentence."""
+        """Return the assumptions of a verdict on a stage with this controller, in a sentence."""
         return ""
 
     @classmethod
@@ -249,7 +259,7 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a controller's keys that follow other keys of the stage, at their present values.
+    """Return a controller's keys that depend on other keys of the stage, at their present values.
 
     The controller is tuned once, for the machine of the stage file.
     """

@@ -28,10 +28,12 @@ _EXPECTED = "a file with keys and the matrix of their correlations"
 _EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'
 
 ROUNDING = 1e-9
-"""By which a matrix may be asymmetric, its diagonal off 1, or an eigenvalue below 0: it comes from rounded numbers."""
+"""Tolerance for rounded numbers of a matrix.
+
+It bounds asymmetry, deviation of the diagonal from 1, and negative eigenvalues."""
 
 MOST = 100
-"""Draws per stage that is asked for, at most, before it is said that hardly any is allowed."""
+"""Largest number of draws per stage before the ranges are reported to allow hardly any."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class Correlations:
 
 
 def _problem(matrix: np.ndarray, size: int) -> str:
-    """Return why this is no correlation matrix of so many keys; "" if it is one."""
+    """Return why a matrix is not a correlation matrix of `size` keys; "" if it is one."""
     if matrix.shape != (size, size):
         return f"{' x '.join(map(str, matrix.shape))} numbers for {size} keys"
     if not np.isfinite(matrix).all():
@@ -130,7 +132,7 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
-    """Raises StageError for a key that the stage does not have, or that is not uncertain there."""
+    """Raise StageError for a key that the stage lacks, or that is not uncertain in it."""
     keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:
@@ -146,8 +148,8 @@ def _belongs(correlations: Correlations, stage: Stage) -> None:
 class Sample:
     """Stages drawn at random: dotted keys to SI arrays, shape (count,).
 
-    Draws in which a key was `beyond` its bound, or that broke a rule between keys (`broken`: what was expected, to how
-    many), were replaced by others.
+    Some draws were replaced. `beyond` counts those in which a key exceeded its bound. `broken` counts those that broke
+    a rule between keys, by the rule.
     """
 
     keys: Mapping[str, np.ndarray]
@@ -157,7 +159,7 @@ class Sample:
 
     @property
     def left_out(self) -> int:
-        """Draws that no stage may have."""
+        """Return the number of draws that were replaced."""
         return self.beyond + sum(self.broken.values())
 
 
@@ -195,9 +197,9 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
 
 
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the uncertain keys at shares of independent uniform distributions.
+    """Return the uncertain keys at quantiles, given as independent uniform numbers.
 
-    Shares have the shape (count, keys).
+    Both have the shape (count, keys).
     """
     from scipy.special import ndtr, ndtri
 
@@ -215,7 +217,7 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which draws a stage may have, and which rule between keys others break.
+    """Return which draws are valid stages, and which rule between keys the others break.
 
     Both have the shape (count,); the rule is "" for none.
     """
@@ -232,7 +234,7 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Return the flat keys of drawn stages.
 
-    The controller stays as tuned: it does not know the mass that was drawn.
+    The controller stays tuned for the original stage: it does not know the drawn mass.
     """
     flat = stage.flat()
     return stage.flat(as_tuned(flat) | dict(keys))

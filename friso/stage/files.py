@@ -1,4 +1,4 @@
-"""Stage files: reading, writing, and the KEY=VALUE of the command line."""
+"""Read and write stage files, and read the KEY=VALUE of the command line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
 
 MOST_BYTES = 4_000_000
-"""Size of a text file at most."""
+"""Largest size of a text file in bytes."""
 
 Read = TypeVar("Read")
 
@@ -33,7 +33,7 @@ _HINTS = {
     ".tdms": "friso logs {}",
     ".zarr": "friso map {}",
 }
-"""What a file is for that is no stage file, by its suffix."""
+"""Hint for files that are not stage files, by suffix: the command that reads them."""
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -122,7 +122,7 @@ def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[st
 
 
 def _refuse_specification(tables: Mapping[str, Any]) -> None:
-    """Raises StageError for what describes a design instead of a stage."""
+    """Raise StageError for tables that describe a design instead of a stage."""
     if len({"machine", "moves", "leaves", "position", "safety"} & tables.keys()) > 1:
         raise StageError("", "a specification of a design", _EXPECTED, "friso design STAGE.toml SPECIFICATION.toml")
 
@@ -209,7 +209,7 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = Fa
 
 
 _NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x19\x80-\x9f]")
-"""What no text in Latin-1 has, as UTF-16 and data have."""
+"""Bytes that a Latin-1 text does not contain, but UTF-16 and binary data do."""
 
 
 def _utf_8_or_latin(content: bytes) -> str:
@@ -249,20 +249,26 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
 _PARTS = 32
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
-"""Keys of more parts than any table has; the time that thousands of them take grows with the square of their number."""
+"""Pattern of keys with more parts than any table has.
+
+Thousands of parts would take a time that grows with the square of their number."""
 
 _TABLE = re.compile(rf"^[ \t]*\[\[?[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART})*[ \t]*\](?!.*,[ \t]*$)", re.MULTILINE)
-"""The heading of a table; a row of an array ends with a comma."""
+"""Pattern of the heading of a table.
+
+A row of an array differs in that it ends with a comma."""
 
 MOST_TABLES, MOST_LINES = 1000, 20_000
-"""How many tables and lines a text has at most: those of a megabyte take seconds."""
+"""Largest number of tables, and of lines, of a text.
+
+A megabyte of either takes seconds."""
 
 _PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
 
 _TYPOGRAPHIC = tuple("\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb")
 
 _WIDTH = 100
-"""How much of a line is shown, at most."""
+"""Largest number of characters shown of a line."""
 
 
 def _syntax_error(text: str, message: str) -> str:
@@ -284,11 +290,11 @@ def _syntax_error(text: str, message: str) -> str:
 
 
 _INDENT = " " * 12
-"""Below what an InputError says was given."""
+"""Indentation of further lines in the message of an InputError."""
 
 
 def _open_quote(line: str) -> int | None:
-    """Return where the quote stands that is not closed in a line, None for none."""
+    """Return the position of a quote that is not closed in a line; None if there is none."""
     opened, escaped = None, False
     for place, sign in enumerate(line):
         if escaped:

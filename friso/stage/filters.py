@@ -11,24 +11,26 @@ from friso.stage.lists import Several, Values, row_keys
 from friso.stage.section import Rule, TableArray, UncertainSection, Variants, keys_below
 
 FORWARD, FEEDBACK = "forward", "feedback"
-"""What a filter acts on: the force that is demanded, or what is measured."""
+"""Paths of filters: the demanded force, or the measured signal."""
 
 FILTER_RULE = "drive.filter_discretisation"
-"""The key that says how a drive takes filters which do not say it themselves."""
+"""Key of the rule that applies to filters without a rule of their own."""
 
 MOST = 12
-"""Filters of a controller at most."""
+"""Largest number of filters of a controller."""
 
 FilterRule = Literal["bilinear", "prewarped", "backward_euler"]
-"""How a drive takes a filter in discrete time: by the bilinear transform (Tustin), as it is or such that the filter is
-exact at the frequency of its poles; or by differences to the sample before."""
+"""Rule by which a drive discretises a filter.
+
+They are the bilinear transform (Tustin), the bilinear transform prewarped to be exact at the frequency of the poles,
+and backward differences."""
 
 Polynomial = tuple[Any, Any, Any]
 """Coefficients of 1, s [s] and s^2 [s^2]."""
 
 
 class Transfer(NamedTuple):
-    """A transfer function; its lower polynomial begins with 1."""
+    """A transfer function; the lowest coefficient of its denominator (`lower`) is 1."""
 
     upper: Polynomial
     lower: Polynomial
@@ -41,7 +43,7 @@ class FilterSection(UncertainSection):
     path: Literal["forward", "feedback"] = FORWARD
 
     sampled: ClassVar[bool] = False
-    """Whether it is given by coefficients for samples, which no rule of a drive changes."""
+    """Whether the filter is given by coefficients for samples, which no rule of a drive changes."""
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
@@ -87,7 +89,7 @@ class NotchFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """Return the formula of the class."""
+        """Return the transfer function of a notch."""
         omega, width = _omega(row["frequency"]), _omega(row["width"])
         damping, bend = width / omega**2, 1 / omega**2
         return Transfer((1, (1 - row["depth"]) * damping, bend), (1, damping, bend))
@@ -110,7 +112,7 @@ class LowPassFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: int) -> Transfer:
-        """Return the formula of the class."""
+        """Return the transfer function of a low-pass."""
         omega = _omega(row["frequency"])
         lower = (1, 1 / omega, 0) if variant == 1 else _second_order(omega, row["damping_ratio"])
         return Transfer((1, 0, 0), lower)
@@ -126,7 +128,7 @@ class LeadLagFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """Return the formula of the class."""
+        """Return the transfer function of a lead or lag."""
         zero, pole = (_omega(row[f"{place}_frequency"]) for place in ("zero", "pole"))
         return Transfer((1, 1 / zero, 0), (1, 1 / pole, 0))
 
@@ -152,7 +154,7 @@ class BiquadFilter(ContinuousFilter):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """Return the formula of the class."""
+        """Return the transfer function of a biquad."""
         zeros, poles = (
             _second_order(_omega(row[f"{place}_frequency"]), row[f"{place}_damping"]) for place in ("zero", "pole")
         )
@@ -185,7 +187,7 @@ class SampledBiquadFilter(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
-        """Return the formula of the class."""
+        """Return the continuous transfer function by the inverse bilinear transform."""
         half = row["sample_time"] / 2
         b0, b1, b2 = (row[f"numerator.{n}"] for n in (1, 2, 3))
         a1, a2 = (row[f"denominator.{n}"] for n in (1, 2))
@@ -196,7 +198,7 @@ class SampledBiquadFilter(FilterSection):
 
 
 def _omega(frequency: Any) -> Any:
-    """Angular frequency [rad/s] of one in hertz, exact where it is a symbol."""
+    """Return the angular frequency [rad/s] of a frequency [Hz], exact for a symbol."""
     if isinstance(frequency, float):
         return 2 * pi * frequency
     from sympy import pi as exact
@@ -209,7 +211,7 @@ def _second_order(omega: Any, damping: Any) -> Polynomial:
 
 
 class FilterForm(NamedTuple):
-    """A filter by its kind, where it acts, what its equations depend on, and its discretisation."""
+    """A filter's form: its kind, its path, the choices of its equations, and its discretisation."""
 
     kind: str
     path: str

@@ -17,11 +17,11 @@ Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
 """Flat keys that follow from others, from the flat SI mapping; arrays allowed."""
 
 DERIVATIONS: dict[str, Derivation] = {}
-"""By table: what follows for a stage that has it."""
+"""Derivations by table: each computes the keys that follow from a table."""
 
 
 def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
-    """Decorator: the function returns what follows from a table."""
+    """Decorate a function that computes the keys that follow from a table."""
 
     def register(derivation: Derivation) -> Derivation:
         DERIVATIONS[table] = derivation
@@ -31,7 +31,7 @@ def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
 
 
 def derived(flat: dict[str, Any]) -> dict[str, Any]:
-    """Return the flat keys with all that follow from their tables."""
+    """Return the flat keys with all keys that follow from their tables."""
     load_own("friso.derivations")
     tables = {key.split(".")[0] for key in flat}
     for table, derivation in DERIVATIONS.items():

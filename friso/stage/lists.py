@@ -1,8 +1,8 @@
-"""Keys that take an array: of values, `element_stiffness = ["40 N/um", "30 N/um"]`, or of tables,
-`[[controller.filters]]`.
+"""Define keys that take an array: of values, or of tables.
 
-In `Stage.flat` every element has a key of its own, numbered from 1: friction.element_stiffness.2; those of tables have
-one for each of their keys: controller.filters.2.frequency.
+Examples are `element_stiffness = ["40 N/um", "30 N/um"]` and `[[controller.filters]]`. In `Stage.flat` every element
+has a key of its own, numbered from 1, such as friction.element_stiffness.2. A table in an array has one for each of its
+keys, such as controller.filters.2.frequency.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ class Rows(tuple[Any, ...]):
 class Several:
     """A key that takes an array of at least `least` and, if stated, at most `most` values.
 
-    `examples` are such values. A value `alone` may stand for an array of one.
+    `examples` are two such values. With `alone`, a single value may stand for an array of one.
     """
 
     of: Quantity | Number
@@ -99,7 +99,7 @@ class Several:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """A key that takes an array of numbers that belong together and are not varied one by one.
+    """A key that takes an array of numbers that are only varied together.
 
     `roots` may be complex, written as texts.
     """

@@ -31,7 +31,9 @@ class ReferenceForm(NamedTuple):
 
 
 QUADRATIC = ReferenceForm()
-"""Pieces of parabola, which any motion with bounded acceleration is made of; and a reference that stands."""
+"""Form of a reference of parabolic pieces.
+
+It fits any motion with bounded acceleration, and a reference that stands."""
 
 
 class Tone(NamedTuple):
@@ -44,9 +46,9 @@ class Tone(NamedTuple):
 
 
 class Stand(NamedTuple):
-    """A place where the reference stands, from its `corner` [s] `until` [s] it leaves.
+    """A place where the reference stands still.
 
-    It may also stand to the end of the run.
+    It stops there at `corner` [s] and leaves at `until` [s], or stays to the end of the run.
     """
 
     corner: Any
@@ -54,9 +56,9 @@ class Stand(NamedTuple):
 
 
 class Lowered(NamedTuple):
-    """A peak that a move is too short to reach.
+    """A limit that a move is too short to reach.
 
-    It has the move's distance [m], the limit's name, unit and value, and the peak [SI].
+    It has the move's distance [m], the limit's name, unit and value, and the peak that is reached [SI].
     """
 
     distance: float
@@ -67,13 +69,15 @@ class Lowered(NamedTuple):
 
 
 Piece = tuple[Any, ...]
-"""Start time [s], and position [m], velocity [m/s], acceleration [m/s^2] there, then jerk and snap as far as needed."""
+"""Start time [s], and position [m], velocity [m/s] and acceleration [m/s^2] there.
+
+Jerk and snap follow as far as needed."""
 
 
 class Motion(UncertainSection):
-    """Base of the motions: a kind declares its keys, and its reference.
+    """Base of the motions: each kind declares its keys and its reference.
 
-    A reference is made of pieces of polynomials, sinusoids, or both. The functions take the stage as flat keys to SI
+    A reference consists of polynomial pieces, sinusoids, or both. The functions take the stage as flat keys to SI
     numbers, or arrays with one entry per run.
     """
 
@@ -81,7 +85,7 @@ class Motion(UncertainSection):
     duration: Annotated[Any, Quantity("s", positive, "20 s")]
 
     rests: ClassVar[bool] = True
-    """Whether the reference stands in the end, so that the stage may hunt about a place."""
+    """Whether the reference stands still in the end, so that the stage can hunt."""
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
@@ -90,7 +94,7 @@ class Motion(UncertainSection):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the pieces of the polynomial part, from time 0 on; the last one goes on to the end."""
+        """Return the pieces of the polynomial part, from time 0; the last one lasts to the end."""
         return [(0.0, 0.0, 0.0, 0.0)]
 
     @staticmethod
@@ -100,7 +104,7 @@ class Motion(UncertainSection):
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return the length of the motion [m]; 0 where the reference stands still from the start."""
+        """Return the length of the motion [m]; 0 where the reference never moves."""
         return 0.0
 
     @staticmethod
@@ -110,35 +114,35 @@ class Motion(UncertainSection):
 
     @classmethod
     def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
-        """Return the places where the reference comes to stand.
+        """Return the places where the reference stands still.
 
-        For a reference that never stands it is from its last corner on.
+        A reference that never stands has one, from its last corner on.
         """
         return [Stand(cls.pieces(flat)[-1][0], flat[DURATION])]
 
     @staticmethod
     def period(flat: Mapping[str, Any]) -> float | None:
-        """Return the period of a reference that repeats itself for ever [s]; None for any other."""
+        """Return the period [s] of a reference that repeats for ever; None for any other."""
         return None
 
     @staticmethod
     def lowered(flat: Mapping[str, Any]) -> Sequence[Lowered]:
-        """Return the peaks that moves are too short to reach, of a single stage."""
+        """Return the limits that moves of a single stage are too short to reach."""
         return ()
 
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the values of keys that follow from others where they are not given."""
+        """Return the defaults of keys that follow from other keys."""
         return {}
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the keys that change in a move longer by a factor; none if it is no move."""
+        """Return the keys that change when a move becomes longer by a factor; none if there is no move."""
         return {}
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of two keys for moves around this one; none if it is no move.
+        """Return ranges of two keys for moves around the present one; none if there is no move.
 
         `shares` gives both ends, as factors.
         """

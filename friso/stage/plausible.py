@@ -1,5 +1,4 @@
-"""Warn of stage files that are valid but hardly meant: implausible values,
-and an encoder that nothing reads."""
+"""Warn of stage files that are valid but probably wrong: implausible values, and an unused encoder."""
 
 from __future__ import annotations
 
@@ -16,14 +15,16 @@ from friso.stage.stage import Stage
 from friso.stage.transmission import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 
 GRAVITY = 9.81
-"""In m/s^2."""
+"""Acceleration of gravity [m/s^2]."""
 
 STRONGEST = 30.0
-"""Friction of a contact bearing, in weights of what it carries: preload may exceed the weight, not by so much."""
+"""Largest plausible friction of a contact bearing, in weights of its load.
+
+Preload may exceed the weight, but not by so much."""
 
 
 PRESLIDING = (1e-10, 1e-2)
-"""How far [m] a contact gives way before it slides."""
+"""Plausible range of displacements [m] before sliding."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ _ROTARY: Mapping[str, _Usual] = {
     **dict.fromkeys(("friction.static", "friction.coulomb"), _TORQUE),
     "friction.stribeck_velocity": _Usual(1e-7, 100.0, "rad/s", ("rad/s", "mrad/s", "urad/s", "deg/s")),
 }
-"""What rotary axes have, from a mirror to a telescope."""
+"""Usual values of rotary axes, from a mirror to a telescope."""
 
 
 def idle_encoder(stage: Stage) -> Iterator[str]:
@@ -114,7 +115,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
 
 
 def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
-    """Yield the units in which a mass may have been meant, and by what it changes then."""
+    """Yield the units in which a mass may have been meant, and the factor by which each changes it."""
     written = _written(stage, key)
     unit = written.partition(" ")[2].strip()
     if stage.axis_kind == ROTARY or unit not in _MASS.units:
@@ -153,7 +154,10 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """Return usual ranges by key: friction follows the weight, presliding follows friction."""
+    """Return usual ranges by key.
+
+    Friction scales with the weight, and stiffness before sliding with friction.
+    """
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
@@ -171,13 +175,13 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
 
 
 def _presliding(force: float) -> _Usual:
-    """Return the usual range of a contact's stiffness before sliding, for a force."""
+    """Return the usual range of a contact's stiffness before sliding, for a friction force."""
     low, high = (force / way for way in reversed(PRESLIDING))
     return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 
 
 def _written(stage: Stage, key: str) -> str:
-    """Return what the user wrote; "" for what follows from other keys."""
+    """Return the value of a key as the user wrote it; "" if it follows from other keys."""
     here: Any = stage.as_written()
     for name in key.split("."):
         here = here[int(name) - 1] if isinstance(here, list) else here.get(name, "")
@@ -187,7 +191,10 @@ def _written(stage: Stage, key: str) -> str:
 
 
 def _question(written: str, usual: _Usual) -> str:
-    """Return which unit was probably meant: one with which the same number is usual."""
+    """Return a question that names the unit that was probably meant.
+
+    With that unit, the number as written is usual.
+    """
     number, _, unit = written.partition(" ")
     for other in usual.units:
         factor = Quantity(usual.unit, any_sign, "").factor(other)

@@ -27,7 +27,7 @@ SCRIPT = "__main__"
 
 @dataclass(frozen=True)
 class PlugIn:
-    """A module outside friso by its name, and the file that it was loaded from; "" where it has none."""
+    """A module outside friso: its name, and the file that it was loaded from ("" for none)."""
 
     module: str
     file: str
@@ -38,7 +38,7 @@ class PlugIn:
         return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
 
     def load(self) -> None:
-        """Import the module by its name if that gives this file, else from the file.
+        """Import the module by its name if that leads to its file, else from the file.
 
         Raises ImportError.
         """
@@ -69,7 +69,7 @@ def plug_in_of(cls: type) -> PlugIn | None:
 
 
 def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
-    """Return the plug-ins that these classes come from, each once."""
+    """Return the plug-ins that classes come from, each once."""
     return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
 
 
@@ -79,8 +79,9 @@ FRISO = {
     "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
     "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
 }
-"""The modules that register what is friso's own, by group: they stand on floors above, and are imported when a stage
-is first read."""
+"""Modules that register friso's own sections, by group.
+
+They belong to higher layers, and are imported when a stage is first read."""
 
 
 def load_own(group: str) -> None:
@@ -92,9 +93,9 @@ def load_own(group: str) -> None:
 
 @cache
 def load_installed(group: str) -> None:
-    """Import what installed packages name in a group of entry points, to register sections.
+    """Import the modules of installed packages in a group of entry points, to register their sections.
 
-    A package that cannot be imported, or registers a name that is taken, is reported and left out.
+    A package that cannot be imported, or registers a name that is taken, is reported and skipped.
     """
     for name, module in installed_modules(group).items():
         try:

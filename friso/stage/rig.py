@@ -31,24 +31,26 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 
 
 AS_BUILT = ("drive", "rail", "cable", "floor")
-"""The tables of the machine as built, which the analyses of the ideal one leave out."""
+"""Tables of the machine as built, which analyses of the ideal machine omit."""
 
 CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn"})
-"""Keys of [drive] that say nothing of how it is carried out."""
+"""Keys of [drive] that only convert units, and do not make it a drive as built."""
 
 
 def is_as_built(stage: Any) -> bool:
-    """Tell whether a stage describes its drive as built, such as its samples, or surroundings."""
+    """Tell whether a stage describes its drive as built, such as its samples, or its surroundings."""
     if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
     return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
 
 
 IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]
-"""How a drive integrates: by trapezoids, or by a sum that ends with the present sample or with the one before."""
+"""Rule by which a drive integrates.
+
+It is the trapezoidal rule, or a sum that ends with the present sample (backward) or with the one before (forward)."""
 
 LOOPS = ("velocity", "position")
-"""The loops that may have a sample time of their own, drive.<loop>_sample_time."""
+"""Loops that may have their own sample time, drive.<loop>_sample_time."""
 
 
 def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
@@ -68,7 +70,7 @@ def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
 
 
 def _one_travel(flat: Mapping[str, Any]) -> Any:
-    """Tell whether what a turn moves is told once, or twice the same."""
+    """Tell whether the travel per turn is stated once, or twice with equal values."""
     of_drive, lead, ratio = (
         flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio")
     )
@@ -77,7 +79,7 @@ def _one_travel(flat: Mapping[str, Any]) -> Any:
 
 
 def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
-    """Tell whether prewarped filters are exact below half the sampling frequency."""
+    """Tell whether prewarped filters are exact at frequencies below half the sampling frequency."""
     fine: Any = True
     for place in row_keys(flat, FILTERS_KEY) if "drive.sample_time" in flat else ():
         law: Any = FILTERS.classes[flat[f"{place}.kind"]]
@@ -225,7 +227,7 @@ class Density(Quantity):
 
     @property
     def expected(self) -> str:
-        """Return what the key takes, in words."""
+        """Return the values that the key accepts, in words."""
         return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
 
     def read(self, entry: Any) -> Value:

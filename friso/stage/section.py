@@ -1,5 +1,4 @@
-"""Base of all tables of a stage file: strict keys, readable errors, rules,
-and variants by a tag."""
+"""Base of all tables of a stage file: strict keys, readable errors, rules, and variants."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
@@ -37,18 +36,20 @@ class Rule:
     example: str
 
     def at(self, place: str) -> "Rule":
-        """Return the rule between the keys of a table at a place of the stage file."""
+        """Return the rule for the keys of a table at a place of the stage file."""
         keys = tuple(f"{place}.{key}" for key in self.keys)
         return Rule(keys, lambda flat: self.holds(keys_below(flat, place)), self.expected, self.example)
 
 
 def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
-    """Return the flat keys of a table, without its place."""
+    """Return the flat keys below a table, without the name of the table."""
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
 MOST_KEYS = 100
-"""Keys of a table at most, unknown ones too: for each of these the nearest known one is looked for."""
+"""Largest number of keys of a table, unknown ones included.
+
+The nearest known key is looked for to each unknown one."""
 
 
 class Section(BaseModel):
@@ -58,14 +59,14 @@ class Section(BaseModel):
 
     rules: ClassVar[tuple[Rule, ...]] = ()
     refusal: ClassVar[type[InputError]] = InputError
-    """What is raised by it, and by the sections in it."""
+    """The error raised by this section and the sections within it."""
 
     def __init__(self, /, **data: Any) -> None:
         self._take(data, LINEAR)
 
     @classmethod
     def on(cls, kind: AxisKind, data: Mapping[str, Any]) -> Self:
-        """Return the section of a stage with this kind of axis, which decides the units of keys."""
+        """Return the section of a stage with a kind of axis, which decides the units of keys."""
         section = cls.__new__(cls)
         section._take(data, kind)
         return section
@@ -128,7 +129,7 @@ class UncertainSection(Section):
         return values
 
     def uncertain(self) -> dict[str, Interval]:
-        """Return the intervals of the uncertain quantities by key, those without width left out."""
+        """Return the intervals of the uncertain quantities by key; intervals without width are left out."""
         values = {key: value.interval for key, value in self.numbers.items() if isinstance(value, UncertainValue)}
         return {key: interval for key, interval in values.items() if interval.low < interval.high}
 
@@ -162,9 +163,9 @@ class Table:
 
 
 class Variants:
-    """Sections distinguished by one of their keys, the tag: `kind` of [motion], `model` of [friction].
+    """Sections distinguished by one key, the tag: `kind` of [motion], `model` of [friction].
 
-    Installed packages may declare more in the entry points of a `group`; they are imported where a name is not known.
+    Installed packages may add more through entry points of a `group`, which are imported when an unknown name is met.
     """
 
     def __init__(self, tag: str, group: str = "") -> None:
@@ -221,7 +222,7 @@ class Variants:
 
 @dataclass(frozen=True)
 class OneTable:
-    """A single class of tables, where there might be variants."""
+    """A table of a single class, in place of variants."""
 
     section: type[Section]
 
@@ -232,7 +233,10 @@ class OneTable:
 
 @dataclass(frozen=True)
 class TableArray:
-    """A key that takes an array of tables, `most` of them at most, of `variants`; `example` shows one."""
+    """A key that takes an array of tables.
+
+    There are at most `most` tables, of the `variants`; `example` shows one.
+    """
 
     variants: Variants | OneTable
     example: str
@@ -272,20 +276,20 @@ def table_arrays(cls: type[Section]) -> Mapping[str, TableArray]:
 
 @cache
 def numeric_fields(cls: type[Section]) -> Mapping[str, Quantity | Number]:
-    """Unit, bound and example of each numeric key of a table."""
+    """Return unit, bound and example of each numeric key of a table."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Quantity | Number)}
 
 
 @cache
 def list_fields(cls: type[Section]) -> Mapping[str, Several]:
-    """Return the keys of a table that take an array, and what of."""
+    """Return the keys of a table that take an array, each with the declaration of the array."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Several)}
 
 
 def nearest_name(name: Any, names: Iterable[str]) -> str | None:
-    """Return the known name most like `name`, if one is like it."""
+    """Return the known name most similar to `name`; None if none is similar."""
     return next(iter(difflib.get_close_matches(str(name).lower(), [*names], n=1, cutoff=0.7)), None)
 
 
@@ -330,15 +334,15 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
 
 
 def _own_first(cls: type[Section]) -> list[str]:
-    """Return the keys of a table, its own before those that it shares with others."""
+    """Return the keys of a table: its own first, then those common to several tables."""
     declared = (name for base in cls.__mro__ for name in vars(base).get("__annotations__", ()))
     return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
 def _complete(error: InputError, key: str) -> InputError:
-    """Return the error as seen from the table, below `key`.
+    """Return an error completed with the key below which it occurred.
 
-    `key` also goes before an example that is a mere value.
+    `key` also precedes an example that is a mere value.
     """
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example

@@ -142,13 +142,13 @@ class Stage(Section):
         self._take(data, axis_written(data))
 
     def __getstate__(self) -> dict[Any, Any]:
-        """Return what is pickled: the tables, without what has been worked out from them."""
+        """Return the state to be pickled: the tables, without cached results."""
         state = super().__getstate__()
         return state | {"__dict__": {key: item for key, item in state["__dict__"].items() if not key.startswith("_")}}
 
     @property
     def axis_kind(self) -> AxisKind:
-        """Linear or rotary, which decides on the units, and what an ampere exerts there."""
+        """Return the kind of axis, linear or rotary, and the force or torque per ampere."""
         kind = KINDS[self.axis.kind] if self.axis else LINEAR
         return replace(kind, per_ampere=float(self.actuator.motor_constant)) if self.actuator else kind
 
@@ -205,7 +205,7 @@ class Stage(Section):
             raise StageError(f"transmission.{name}", actual, "what one turn of the motor does there", other)
 
     def _has_one_stiffness(self) -> None:
-        """A joint has its stiffness, or leaf springs from which it follows."""
+        """Check that a joint has a stiffness, or leaf springs from which it follows."""
         joint = self.joint
         if joint and self.flexure:
             keys = ["joint.stiffness"] if joint.stiffness is not None else ["[parasitic]"] if self.parasitic else []
@@ -217,7 +217,7 @@ class Stage(Section):
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
 
     def _has_computable_leaves(self) -> None:
-        """Leaf springs of absurd sizes have neither stiffness nor modes."""
+        """Check that leaf springs have sizes for which stiffness and modes can be computed."""
         try:
             flat = self.flat() if self.flexure else {}
         except InputError:  # leaves that buckle, for one: it says why
@@ -231,7 +231,7 @@ class Stage(Section):
             raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:
-        """Return the values that a rule is about, as the user wrote them."""
+        """Return the values that a rule compares, as the user wrote them."""
         values = [(key.split(".")[-1], _at(self, key)) for key in rule.keys if getattr(self, key.split(".")[0])]
         return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
@@ -257,7 +257,7 @@ class Stage(Section):
         return derived(_with_defaults({**self._declared, **swept}))
 
     def numeric_keys(self) -> Mapping[str, Quantity | Number]:
-        """Unit, bound and example of every numeric key that this stage can have."""
+        """Return unit, bound and example of every numeric key that this stage can have."""
         return self._numeric_keys
 
     @cached_property
@@ -280,16 +280,16 @@ class Stage(Section):
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
-        """Return the numeric keys that may be swept: not those that follow from leaf springs."""
+        """Return the numeric keys that may be swept; keys that follow from leaf springs are excluded."""
         keys = numeric_keys(self._declared)
         if not self.flexure:
             return keys
         return {key: item for key, item in keys.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
 
     def uncertain(self) -> dict[str, Interval]:
-        """Dotted keys of the uncertain quantities to their intervals; their centres stand in `flat`.
+        """Return the intervals of the uncertain quantities by dotted key; `flat` holds their centres.
 
-        A "range" holds values all as likely; a "tolerance" is the 95 % interval of a normal distribution.
+        All values in a "range" are equally likely; a "tolerance" is the 95 % interval of a normal distribution.
         """
         tables = {name: section.uncertain() for name, section in self if isinstance(section, UncertainSection)}
         return {f"{name}.{key}": interval for name, table in tables.items() for key, interval in table.items()}
@@ -307,7 +307,7 @@ class Stage(Section):
     def in_own_units(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Return changes typed next to the stage file, completed by its units.
 
-        A number alone gets the unit that the file has for that key; wrong capitals in a unit are corrected.
+        A bare number gets the unit that the file has for its key; wrong capitals in a unit are corrected.
         """
         tables, keys = self.as_written(), numeric_keys(self.flat())
         units = {key for key in changes if getattr(keys.get(key), "unit", "")}
@@ -337,7 +337,7 @@ class Stage(Section):
         return variants
 
     def to_toml(self) -> str:
-        """Return the text of a stage file that gives this stage again."""
+        """Return the text of a stage file from which an equal stage is read."""
         texts = self.as_written()
         lines = [f"{key} = {as_toml(text)}" for key, text in texts.items() if isinstance(text, str)]
         for name, table in texts.items():
@@ -451,7 +451,7 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
 
 
 def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
-    """Each rule between keys, and where it is broken."""
+    """Yield each broken rule between keys, and where it is broken."""
     for name, owner in (("", Stage), *_tables(flat).items()):
         at_motor = name == MOTOR_FRICTION
         for rule in owner.rules:
@@ -488,7 +488,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
 
 
 def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
-    """Return how a table is written in TOML: its own keys, then the arrays of tables in it."""
+    """Return the lines of a table in TOML: its own keys, then its arrays of tables."""
     arrays = {
         key: value
         for key, value in table.items()
@@ -510,7 +510,7 @@ def _at(stage: Stage, key: str) -> Any:
 
 
 def _toml(value: Any) -> str:
-    """Return how a key's value, a scalar or a list of them, is written in TOML."""
+    """Return a key's value, a scalar or a list, as TOML."""
     return f"[{', '.join(map(as_toml, value))}]" if isinstance(value, list) else as_toml(value)
 
 
@@ -525,7 +525,7 @@ def _plain(value: Any) -> Any:
 
 
 def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
-    """Fill in the defaults that follow other keys."""
+    """Return the flat keys with the defaults that follow from other keys."""
     if (mass := motor_mass(flat)) is not None:
         flat.setdefault(MOTOR_MASS, mass)
     for key, value in controller_of(flat).with_defaults(flat).items():

@@ -56,7 +56,7 @@ PAIRS = (
     ("stiction_push", "stiction_push_window"),
     ("dither_amplitude", "dither_frequency"),
 )
-"""Keys that come together."""
+"""Keys that must be given together."""
 
 EXAMPLES = {
     "integral_deadband": 'integral_deadband = "1 um"',
@@ -70,7 +70,7 @@ EXAMPLES = {
 
 
 class FrictionSettings(NamedTuple):
-    """Which of the settings against friction a controller has."""
+    """The settings against friction that a controller has."""
 
     limit: bool = False
     leak: bool = False
@@ -97,7 +97,7 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
 
 
 def dead_band(flat: Mapping[str, Any]) -> Any:
-    """Return the error [m] up to which the controller does nothing; 0 without a dead zone."""
+    """Return the error [m] up to which the controller exerts no force; 0 without a dead zone."""
     return flat.get("controller.error_deadband", 0.0)
 
 

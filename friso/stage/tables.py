@@ -71,14 +71,15 @@ class FrictionSection(UncertainSection):
     decisive: ClassVar[tuple[str, ...]] = ()
     """The numeric keys on which `variant` depends."""
     under_conditions: ClassVar[bool] = False
-    """Whether static and Coulomb friction are multiplied by what [conditions] make of them."""
+    """Whether [conditions] multiply static and Coulomb friction of the law."""
     decided_by: ClassVar[Mapping[str, str]] = {}
-    """The experiment that would tell the value of a key that other measurements leave open; under "", the one that
-    tells the law from LuGre's."""
+    """Experiments that would determine keys that other measurements leave open, by key.
+
+    Under "" stands the experiment that distinguishes the law from LuGre."""
     fitted: ClassVar[bool] = False
     """Whether `friso identify` fits the law's parameters to logs of moves."""
     words: ClassVar[Mapping[str, str]] = {}
-    """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
+    """Names of keys on the axes of maps, where the key itself is not clear enough."""
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
@@ -99,34 +100,35 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def keeping(measured: Any, elements: int) -> dict[str, Any]:
-        """Return keys with which the law shows what was measured, as nearly as it can [SI].
+        """Return keys for which the law reproduces measured friction as closely as it can [SI].
 
-        Laws with several elements have `elements` side by side.
+        Laws with several elements have `elements` in parallel.
         """
         return {}
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
-    """Numbers that a fit finds besides steady friction, stiffness and damping before sliding: the least that each may
-    be, one to begin with, the most; all greater than 0."""
+    """Parameters that a fit determines besides steady friction, and stiffness and damping before sliding.
+
+    For each: lower bound, initial value, upper bound; all are greater than 0."""
 
     @staticmethod
     def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys with the measured steady friction, stiffness and damping, and a `shape` [SI].
+        """Return keys with measured steady friction, stiffness and damping, and with a `shape` [SI].
 
-        A law that declares it can be fitted (`friso.identification.laws`).
+        A law that declares `shape` can be fitted (`friso.identification.laws`).
         """
         return {}
 
     @staticmethod
     def left_open(measured: Any) -> dict[str, tuple[float, float]]:
-        """Return the keys on which the measurements do not decide, and their ranges."""
+        """Return the keys that the measurements do not determine, and their ranges."""
         return {}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition for passivity that the stage does not meet.
+        """Return the condition of passivity that the stage violates; "" if it is passive or undeclared.
 
-        Without passivity the law gives energy back, which no friction does. "" if it is passive or does not say.
+        A law that is not passive returns more energy than it received, as no real friction does.
         """
         return ""
 
@@ -141,9 +143,9 @@ def friction_law(name: str) -> type[FrictionSection]:
 
 
 def passive_where(flat: Mapping[str, Any]) -> str:
-    """Return the condition of passivity that a stage's friction law does not meet.
+    """Return the condition of passivity that a stage's friction law violates.
 
-    It is in the units of its axis; "" if the law is passive, or does not say.
+    It is in the units of its axis; "" if the law is passive, or declares none.
     """
     return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
@@ -192,7 +194,7 @@ class Bias(UncertainSection):
 
 
 ROUNDING = 1e-12
-"""Relative slack of the limits on times, which are sums of decimal numbers."""
+"""Relative slack of limits on times, which are sums of decimal numbers."""
 
 
 class StatedMoves(Section):

@@ -18,7 +18,7 @@ MOTOR_MASS, INERTIA, LEAD, RATIO, BACKLASH = (
     f"{TRANSMISSION}.{name}" for name in ("mass", "inertia", "lead", "ratio", "backlash")
 )
 STATE_PREFIX = "motor_"
-"""How names begin of what belongs to the motor."""
+"""Prefix of the names of states that belong to the motor."""
 
 MOTOR_STATES = ("motor_position", "motor_velocity")
 """Names of the motor's position and velocity, at the load."""
@@ -73,13 +73,13 @@ def motor_mass(flat: Mapping[str, Any]) -> Any:
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the flat keys with the motor's friction under [friction], if no other is there."""
+    """Return the flat keys with the motor's friction under [friction], if the guide has none."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 
 
 def moving_mass(flat: Mapping[str, Any]) -> Any:
-    """Return all that the controller moves [kg], at the load."""
+    """Return the whole mass that the controller moves [kg], reflected to the load."""
     return sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage", MOTOR_MASS))
 
 
@@ -93,6 +93,6 @@ def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def as_friction(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of [motor_friction] as a friction law knows them."""
+    """Return the keys of [motor_friction] under the names that a friction law uses."""
     before = f"{MOTOR_FRICTION}."
     return {f"friction.{key.removeprefix(before)}": value for key, value in flat.items() if key.startswith(before)}

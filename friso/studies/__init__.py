@@ -1,1 +1,1 @@
-"""Studies: many stages at once."""
+"""Run and judge many stages at once: sweeps, stores, draws, comparisons."""

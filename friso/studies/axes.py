@@ -1,4 +1,4 @@
-"""Axes of a study: what was given (texts, ranges, arrays with a unit) read into SI values."""
+"""Read the axes of a study (texts, ranges, arrays with a unit) into SI values."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 
 @dataclass(frozen=True)
 class SweptAxis:
-    """A swept key, a scaling, or a free name that links use.
+    """An axis of a study: a swept key, a scaling, or a free variable that links use.
 
     It has SI values (or words and booleans), their unit, and their scale.
     """
@@ -52,7 +52,7 @@ class SweptRange:
     scale: Scale
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """Return the values at shares of the way from the first to the last, each from 0 to 1."""
+        """Return the values at fractions, from 0 to 1, of the way from the first to the last."""
         if self.scale == "log":
             return np.exp(np.log(self.first) + share * (np.log(self.last) - np.log(self.first)))
         return self.first + share * (self.last - self.first)
@@ -87,10 +87,10 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 
 
 class _Reader:
-    """Reads the numbers of an axis, of any sign.
+    """Reader of the numbers of an axis, of any sign.
 
-    A value that no stage may have makes its cells invalid, not the axis. A free name (`field` None) takes the SI unit
-    of the first key of the same kind.
+    A value that no stage may have makes its cells invalid, not the axis. A free variable (`field` None) takes the SI
+    unit of the first key of that kind.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:
@@ -110,7 +110,7 @@ class _Reader:
         return float(self.field.read(bare if isinstance(self.field, Number) and bare is not None else entry))
 
     def factor(self, unit: str) -> float:
-        """SI value of 1 `unit`."""
+        """Return the SI value of 1 `unit`."""
         if self.field is None and unit:
             self.field = self._natural(f"1 {unit}")
         if isinstance(self.field, Quantity):
@@ -130,7 +130,7 @@ class _Reader:
 
 
 def _number(value: Any) -> float | None:
-    """Return the bare number that was given, None if it is none."""
+    """Return a bare number as given, None for anything else."""
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
         return float(value)
     try:
@@ -185,7 +185,7 @@ def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis
 
 
 def _items(values: Any) -> list[Any]:
-    """Return the values of a list. Raises InputError for what is none."""
+    """Return the values of a list. Raises InputError for anything else."""
     try:
         return list(values)
     except TypeError:

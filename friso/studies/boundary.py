@@ -1,4 +1,4 @@
-"""The boundary of hunting over ranges as a user gives them."""
+"""Compute the boundary of hunting over ranges given by a user."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def boundary(
 
 
 def _refuse_impossible(space: Space, example: str) -> None:
-    """Raises InputError if no stage may have the values of the ranges."""
+    """Raise InputError if no stage may have the values of the ranges."""
     settings = StudySettings.current()
     points = space.grid(settings.tried_values)
     if not space.allowed(points).any():
@@ -71,7 +71,7 @@ def _refuse_impossible(space: Space, example: str) -> None:
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
-    """Read a range of a key or of a free name for the boundary of hunting."""
+    """Read a range of a key or of a free variable for the boundary of hunting."""
     read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
         raise InputError(

@@ -1,4 +1,4 @@
-"""Boundaries of hunting as numbers: branches and curves point by point, and the verdict at stages between them."""
+"""Convert boundaries of hunting to numbers: branches and curves point by point, and verdicts at stages in between."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 from friso.hunting import CLOSED, END_OF_RANGE, Branch, Curve, Cycles, Diagram, LocatedPoint, Meeting, Plane, Space
 
 CycleShape = Literal["symmetric", "asymmetric", "whole"]
-"""A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
+"""Kind of a cycle: symmetric, its own mirror image; asymmetric, of a symmetric stage; whole, of a stage that is not
+symmetric."""
 
 ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
-"""The verdicts of a boundary, by everything that simulations from many starts end in: the last two where some of these
-failed or did not settle, and where no stage may be."""
+"""Verdicts of a boundary, by all simulations from many starts. The last two stand for failed or unsettled simulations,
+and for invalid stages."""
 
 
 @dataclass(frozen=True)
 class Line:
     """A branch of cycles over one key, or a curve in two: its n points in order.
 
-    `at` [SI], shape (n, keys), and `error`, by how much it may be off (NaN but at special points); `kinds` of the
-    special points ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,); and how the line ends on
-    either side.
+    `at` [SI], shape (n, keys), and its possible `error` (NaN except at special points); `kinds` of the special points
+    ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,); and how the line ends on either side.
     """
 
     shape: CycleShape
@@ -43,12 +43,12 @@ class Line:
 
     @property
     def ordinary(self) -> np.ndarray:
-        """Return the numbers of the others."""
+        """Return the numbers of the points that are not special."""
         return np.flatnonzero([not kind for kind in self.kinds])
 
     @property
     def attracts(self) -> np.ndarray:
-        """Tell whether the cycle attracts from each point to the next, shape (n - 1,)."""
+        """Tell whether the cycle is stable from each point to the next, shape (n - 1,)."""
         return np.abs(self.multiplier[1:] + self.multiplier[:-1]) < 2
 
 
@@ -76,7 +76,7 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     """Return the points of a branch and its special points inside the range, in order.
 
-    Points within the error of a special point are left out, because it is not known whether they attract.
+    Points within the error of a special point are left out, because their stability is not known.
     """
     path = np.array([point.vector for point in branch.points])
     ordinary = [
@@ -95,7 +95,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
-    """Return how far along a path, in legs, a point on it lies."""
+    """Return the position of a point along a path, in legs."""
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
     return leg + before[leg] / (before[leg] + after[leg])
@@ -140,10 +140,10 @@ def end_verdicts(result: Diagram) -> tuple[str, str]:
 
 
 class StabilityChange(NamedTuple):
-    """A change between stages that something attracts and stages that nothing does.
+    """A change between stages that hunt and stages that do not.
 
     `begins` tells whether hunting begins there as the key rises. It lies between the two values [SI], which are equal
-    if a followed cycle begins or ceases to attract there.
+    if a followed cycle gains or loses stability there.
     """
 
     begins: bool
@@ -154,8 +154,8 @@ class StabilityChange(NamedTuple):
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return where hunting begins and ends over the range, in order.
 
-    Verdicts within the error of a special point do not tell where: there cycles repel so little that runs may stay on
-    them. They do tell that there is hunting between stages that nothing attracts.
+    Verdicts within the error of a special point do not locate a change, because unstable cycles are so weak there that
+    runs may stay on them. They do show that there is hunting between stages that do not hunt.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
@@ -178,10 +178,7 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
 
 
 def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
-    """Return the values [SI] at which a followed cycle begins (true) or ceases to attract.
-
-    They are taken as the key rises.
-    """
+    """Return the values [SI] at which a followed cycle gains (true) or loses stability as the key rises."""
     return sorted(
         (float(line.at[k, 0]), begins)
         for line in lines(result)
@@ -191,9 +188,9 @@ def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
 
 
 def begins_at(line: Line, k: int) -> bool | None:
-    """Tell whether a cycle begins to attract at a special point as the key rises.
+    """Tell whether a cycle gains stability at a special point as the key rises.
 
-    None if it attracts on both sides of the point along its branch, or on neither.
+    None if it is stable on both sides of the point along its branch, or on neither.
     """
     beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
     if beside[0] == beside[1]:
@@ -203,9 +200,9 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Tell whether one branch of cycles attracts just below and just above a value of the swept key.
+    """Tell whether one branch of cycles is stable just below and just above a value of the swept key.
 
-    False where a branch is in doubt at this value.
+    False if a branch is in doubt at this value.
     """
     if result.in_doubt(np.array([place]))[0]:
         return False
@@ -228,7 +225,7 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     """Return the values [SI] of both keys, and the verdict, at the four corners.
 
-    Their order is both low, second high, first high, both high.
+    They are ordered as both low, second high, first high, both high.
     """
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
@@ -237,9 +234,9 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 class PlaneEdge(NamedTuple):
     """Edge of hunting along one key, for the tried values of the other key [SI].
 
-    `along` is the number of the first key, and `across` (n,) are the values of the other one, ascending. `below` says
-    whether hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,), which are equal where
-    a curve passes.
+    `along` is the number of the first key, and `across` (n,) are the values of the other one, ascending. `below` tells
+    whether hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,), which are equal if a
+    curve passes.
     """
 
     along: int
@@ -294,7 +291,7 @@ EndKind = Literal["range", "closed", "meets", "lost"]
 
 
 class CurveEnd(NamedTuple):
-    """An end of the curve with number `line`: its place [SI], shape (2,), and how it ends."""
+    """An end of the curve with number `line`: its place [SI], shape (2,), and the kind of end."""
 
     line: int
     at: np.ndarray
@@ -325,10 +322,10 @@ def curve_meetings(result: Plane) -> list[Meeting]:
 
 
 def lost_places(result: Plane) -> np.ndarray:
-    """Return where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
+    """Return places [SI] with a change at which no curve could be begun, shape (places, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:
-    """Return the verdicts of stages by what simulations of them end in."""
+    """Return the verdicts of stages by the results of their simulations."""
     return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

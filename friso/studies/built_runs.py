@@ -1,4 +1,4 @@
-"""Runs of cells with the drive as built, in the machine's surroundings."""
+"""Run cells with the drive as built, in the machine's surroundings."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ TIMING = tuple(
     f"drive.{name}"
     for name in ("sample_time", "delay", "velocity_samples", "velocity_sample_time", "position_sample_time")
 )
-"""Keys on which the equations of a drive depend by whole samples."""
+"""Keys on which the equations of a drive depend through whole numbers of samples."""
 
 
 def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:
-    """Tell whether cells run with the drive as built: if only metrics of runs are asked for.
+    """Tell whether cells run with the drive as built: if only metrics of runs are requested.
 
-    A verdict is on the ideal machine, and so are the runs that it looks at.
+    Verdicts, and the runs they use, are of the ideal machine.
     """
     return is_as_built(stage) and of_runs_alone(names)
 
 
 def of_runs_alone(names: Sequence[str]) -> bool:
-    """Tell whether all of some metrics are computed from runs."""
+    """Tell whether all given metrics are computed from runs."""
     every = metrics()
     return all(every[name].source == "run" for name in names if name in every)
 
@@ -45,9 +45,8 @@ def built_runs(
 ) -> Iterator[tuple[Runs, Measures]]:
     """Run cells of one structure as built, and measure them.
 
-    `flat` holds flat keys to SI numbers or arrays (count,). All cells have the same noise. The runs hold statistics
-    and statuses; turning points are those of the samples, in the measures. Once `cancel` is set, no further chunk
-    begins.
+    `flat` has flat keys to SI numbers or arrays (count,). All cells have equal noise. The runs have statistics and
+    statuses; turning points are those of the samples, in the measures. Once `cancel` is set, no further chunk begins.
     """
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
     kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)

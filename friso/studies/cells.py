@@ -1,4 +1,4 @@
-"""Runs of cells: stages that differ from one another in some keys, from columns of values to columns of measures."""
+"""Run cells, stages that differ in some keys: from columns of values to columns of measures."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
 INFERRED = "inferred"
-"""First words of the status of a cell that was not run, but lies among cells that agree."""
+"""First words of the status of a cell that was inferred from agreeing neighbours instead of run."""
 
 
 SURVEYS: Mapping[MetricBasis, Callable[..., StageAttractors]] = {"sketch": sketch_attractors, "survey": find_attractors}
@@ -95,7 +95,7 @@ def ideal_runs(
 
 
 Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
-"""The flat SI form and the numbers of cells, by their words and booleans."""
+"""Flat SI form and numbers of cells, grouped by their words and booleans."""
 
 
 def cell_attractors(
@@ -105,10 +105,10 @@ def cell_attractors(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
-    """Yield what attracts the stages of the chosen cells, by the equations they need.
+    """Yield the attractors of the chosen cells, grouped by equations.
 
-    `chosen` has the shape (cells,). Each part has flat SI values, numbers of cells, and what attracts them, by a
-    function such as `find_attractors`. The motion plays no part: of cells that differ in it alone one is surveyed.
+    `chosen` has the shape (cells,). Each part has flat SI values, numbers of cells, and their attractors by a function
+    such as `find_attractors`. The motion does not matter: of cells that differ only in it, one is surveyed.
     """
     for flat, cells, _ in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), find, threads, cancel)
@@ -132,7 +132,7 @@ def _once(
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return which cells a stage may have, shape (cells,)."""
+    """Return which cells are valid stages, shape (cells,)."""
     table = _Table(len(next(iter(columns.values()))), ("outcome", STATUS))
     for flat, cells in by_words(stage, links, columns):
         table.invalidate(cells, flat)
@@ -140,7 +140,7 @@ def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, 
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return the flat SI form of all cells, links followed, then scalings; numeric columns only."""
+    """Return the flat SI form of all cells with links, then scalings, for numeric columns only."""
     numeric = stage.numeric_keys()
     keys = {name: column for name, column in columns.items() if name in numeric}
     keys |= linked(links, stage.flat(keys) | dict(columns)) if links else {}
@@ -148,7 +148,7 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
 
 
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
-    """Yield the chosen cells, shape (cells,), by the equations they need.
+    """Yield the chosen cells, shape (cells,), grouped by equations.
 
     Each part has flat SI values, numbers of cells, and the structure.
     """
@@ -179,7 +179,7 @@ def by_words(
 
 
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
-    """Yield the places of the valid cells, grouped by the equations they need.
+    """Yield the numbers of the valid cells, grouped by equations.
 
     Only a few keys determine the structure; cells are grouped by those.
     """
@@ -200,9 +200,9 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The growing variables of a study, one entry per cell.
+    """The variables of a study as they are filled, one entry per cell.
 
-    `settled` [s], shape (count,), is when each run has settled within 10 um for good, wherever it is then.
+    `settled` [s], shape (count,), is the time from which each run stays within 10 um of its reference.
     """
 
     def __init__(self, count: int, names: Iterable[str]) -> None:
@@ -211,11 +211,11 @@ class _Table:
         self.metrics = {name: every[name] for name in self.columns if name in every}
 
     def of(self, source: MetricBasis) -> dict[str, Metric]:
-        """Return the metrics that are computed from this source."""
+        """Return the metrics with a given source."""
         return {name: metric for name, metric in self.metrics.items() if metric.source == source}
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
-        """Mark the cells that no stage may have, each with the first reason found."""
+        """Mark the invalid cells, each with the first reason found."""
         for broken, why in violations(flat):
             which = cells[np.broadcast_to(broken, cells.shape) & self.valid[cells]]
             for name in worded():
@@ -225,16 +225,16 @@ class _Table:
 
     @property
     def valid(self) -> np.ndarray:
-        """Return which cells a stage may have, shape (cells,)."""
+        """Return which cells are valid stages, shape (cells,)."""
         return self.columns["outcome"] != "invalid"
 
     @property
     def ran(self) -> np.ndarray:
-        """Return which cells were run, to their end or not, shape (cells,)."""
+        """Return which cells were run, completed or not, shape (cells,)."""
         return ~np.isin(self.columns["outcome"], ("invalid", ""))
 
     def motions(self, cells: np.ndarray) -> Motions:
-        """Return how the motions of the cells went."""
+        """Return the results of the cells' motions."""
         peaks, swing = (self.columns[name][cells] for name in ("peaks", "peak_to_peak"))
         away = self.columns[STATUS][cells] == Status.DIVERGED.text
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
@@ -249,5 +249,5 @@ class _Table:
 
 
 def unfilled(variable: str, shape: int | tuple[int, ...]) -> np.ndarray:
-    """Return an array for a variable before any cell was run: of empty texts, or of NaN."""
+    """Return an array for a variable before any cell was run, of empty texts or of NaN."""
     return np.full(shape, "", dtype=object) if is_text(variable) else np.full(shape, np.nan)

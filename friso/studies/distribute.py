@@ -1,4 +1,4 @@
-"""Studies beyond one process: the blocks go to the workers of a Dask cluster, one task each."""
+"""Compute a study on a Dask cluster, one task for each block."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
 
 
 async def _answers(scheduler: str) -> None:
-    """Raises OSError or ValueError if there is nothing at the address: a client that fails lingers for long."""
+    """Raise OSError or ValueError if nothing answers at the address, because a client that fails lingers for long."""
     settings = StudySettings.current()
     from distributed.comm.core import connect
     from distributed.security import Security
@@ -77,7 +77,7 @@ def run_checked(
 
 
 def _refuse_strangers(client: Any) -> None:
-    """Raises InputError unless every worker has the same friso as this process."""
+    """Raise InputError unless every worker has the friso of this process."""
     if not client.nthreads():
         raise InputError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
 

@@ -30,7 +30,7 @@ from friso.version import VERSION
 class DoctorCheck:
     """One check of the installation: its subject, the result in words, and whether it works.
 
-    `remedy` helps if it does not.
+    `remedy` is advice if it does not.
     """
 
     subject: str
@@ -93,11 +93,11 @@ def _packages() -> Iterator[DoctorCheck]:
 
 
 DEVELOPMENT = ("test", "docs", "bench")
-"""Extras that add nothing for a user."""
+"""Extras of no use to a user."""
 
 
 def _processor() -> str:
-    """Return the processor that code is compiled for, and how wide its registers are."""
+    """Return the processor for which code is compiled, and its register width."""
     from friso.engine.processor import processor
 
     chosen = processor()
@@ -105,7 +105,7 @@ def _processor() -> str:
 
 
 def _kept_code(full_paths: bool) -> str:
-    """Check the folder of compiled code: its size, whether it stays, and who may look in."""
+    """Check the folder of compiled code: its size, whether it is permanent, and who can read it."""
     from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()

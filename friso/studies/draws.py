@@ -1,4 +1,4 @@
-"""Judge a stage whose numbers are uncertain, by the verdicts on many stages drawn from it."""
+"""Judge a stage with uncertain numbers by the verdicts on many stages drawn from it."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from friso.studies.settings import StudySettings
 class Fates:
     """The verdicts on drawn stages, and which of their loops are unstable, both (count,).
 
-    Verdicts are words of `friso.hunting.criteria.VERDICTS`; a loop is `unstable` sticking or sliding. `amplitudes`
-    [m], half of peak to peak, and `periods` [s] are those of the first draws that hunt, shape (count,) or shorter; NaN
-    where nothing attracts, or nothing certain is known.
+    Verdicts are words of `friso.hunting.criteria.VERDICTS`; a loop is `unstable` sticking or sliding. `amplitudes` [m],
+    half of peak to peak, and `periods` [s] are those of the first draws that hunt, shape (count,) or shorter; NaN
+    without an attractor, or without certainty.
     """
 
     verdicts: np.ndarray
@@ -46,9 +46,9 @@ class Fates:
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Return how well each key separates hunting stages from others, the most decisive first.
 
-        Hunting stages have an attracting cycle. The measure is the rank-biserial correlation (Kerby 2014, doi
-        10.2466/11.IT.3.1): 1 if all that hunt have the larger values, -1 if all have the smaller ones, 0 if the key
-        separates nothing. Empty if all share one fate.
+        The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if all hunting stages have
+        the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. Empty if all stages hunt,
+        or none.
         """
         from scipy.stats import mannwhitneyu  # 0.7 s to import
 
@@ -67,8 +67,7 @@ class Fates:
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
     """Return the fates of the drawn stages as given and, with a joint, locked and free.
 
-    After Ctrl-C, they are those of the first of the stages, as many as were judged in all variants by then, without
-    the sizes of their hunting.
+    After Ctrl-C, they are those of the stages judged in all variants by then, without sizes of hunting.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -95,10 +94,9 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 @dataclass(frozen=True)
 class DrawnEdges:
-    """Where the hunting of drawn stages ends in bandwidth [Hz], shape (count,).
+    """Edges of hunting of drawn stages in bandwidth [Hz], shape (count,), each between `low` and `high`.
 
-    It lies between `low` and `high`. Both are NaN for a stage that does not begin or cease to hunt within the
-    bandwidths that were tried.
+    Both are NaN for a stage whose hunting does not begin or end within the tried bandwidths.
     """
 
     low: np.ndarray
@@ -106,9 +104,9 @@ class DrawnEdges:
 
 
 def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
-    """Find the edge of hunting in bandwidth of some drawn stages, near the stage's own `margin`.
+    """Find the edge of hunting in bandwidth of the first drawn stages, near the stage's own `margin`.
 
-    They are the first of the sample. Returns None if there is no margin, or no key states a bandwidth.
+    Returns None if there is no margin, or no key states a bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())
@@ -144,7 +142,7 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 class Draws:
     """Stages drawn from an uncertain one with a seed, and their fates case by case.
 
-    They are fewer than were `asked` for after an interruption, and have no `edges` then.
+    After an interruption they are fewer than were `asked` for, and have no `edges`.
     """
 
     stage: Stage
@@ -164,7 +162,7 @@ class Draws:
         margin: Margin | None = None,
         progress: Progress = silent,
     ) -> Draws:
-        """Judge the stages of a sample, and find the edges of the first near the stage's `margin`.
+        """Judge the stages of a sample, and find the edges of the first ones near the stage's `margin`.
 
         See `fates`.
         """
@@ -180,7 +178,7 @@ class Draws:
 
 
 def different(stage: Stage) -> dict[str, Stage]:
-    """Return the variants of a stage, each once."""
+    """Return the distinct variants of a stage."""
     variants: dict[str, Stage] = {}
     for name, variant in stage.variants().items():
         if variant not in variants.values():

@@ -1,5 +1,4 @@
-"""Compute the blocks of a study in the threads of this process,
-or where an executor sends them."""
+"""Compute the blocks of a study in the threads of this process, or in an executor."""
 
 from __future__ import annotations
 
@@ -23,10 +22,10 @@ _T = TypeVar("_T")
 
 @dataclass
 class Crew:
-    """An executor with its size and its way to be ended.
+    """An executor with its size and a function to end it.
 
-    `size` is how many blocks are computed side by side, and `shares` how many a study needs for all to have work. A
-    flag, shape (1,), ends blocks in flight early. It also holds what it raises if it is to blame itself.
+    `size` is the number of blocks computed side by side, and `shares` the number that a study needs for all to have
+    work. A flag, shape (1,), ends blocks in progress early. It also has the error to raise if it fails itself.
     """
 
     executor: Executor
@@ -37,7 +36,7 @@ class Crew:
     cancel: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     failures: tuple[type[BaseException], ...] = ()
     broken: bool = False
-    """True once the executor has given up: it ends the blocks in flight itself, and they give no result."""
+    """True once the executor has failed: it then ends blocks in progress, which give no result."""
 
     def __enter__(self) -> Self:
         return self
@@ -46,10 +45,10 @@ class Crew:
         self.executor.shutdown(wait=True, cancel_futures=True)
 
     def compute(self, jobs: Iterable[tuple[Study, CellBlock]]) -> Iterator[tuple[Study, CellBlock, Columns]]:
-        """Yield the measures of blocks of studies, in the order in which they are done.
+        """Yield the measures of blocks of studies, in the order of completion.
 
-        No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends this
-        early (Ctrl-C among it) cancels the blocks in flight. Raises Overtaken once nobody waits for them.
+        Only as many blocks are in progress as keep the crew busy, so a study of any length streams. Any early end (such
+        as Ctrl-C) cancels them. Raises Overtaken once nobody waits.
         """
         settings = StudySettings.current()
         self.cancel[0] = 0
@@ -80,7 +79,7 @@ class Crew:
             yield from ((study, block) for block in study.blocks(shape))
 
     def _result(self, future: Future[Columns]) -> Columns:
-        """Raises RuntimeError if the executor failed, and whatever the task raised."""
+        """Return the result of a task. Raises RuntimeError if the executor failed, and any error of the task."""
         with self._blamed():
             return future.result()
 
@@ -99,10 +98,10 @@ class Crew:
 
 
 class _Threads(ThreadPoolExecutor):
-    """Threads that inherit who waits for their results, and whether that goes first."""
+    """Executor threads that inherit the cancel flag and the priority of their caller."""
 
     def submit(self, fn: Callable[..., _T], /, *args: Any, **kwargs: Any) -> Future[_T]:
-        """As any executor does."""
+        """Submit a call, as any executor does."""
         return super().submit(partial(copy_context().run, fn, *args, **kwargs))
 
 
@@ -117,7 +116,7 @@ def local_crew(threads: int | None = None) -> Crew:
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
-    """Return the measures of single cells, by their numbers in C order."""
+    """Return the measures of single cells, given by their numbers in C order."""
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
     for _, block, columns in crew.compute(crew.jobs([picked])):

@@ -1,4 +1,4 @@
-"""Studies for other programs: NetCDF and CSV."""
+"""Write studies for other programs, as NetCDF and CSV."""
 
 from __future__ import annotations
 

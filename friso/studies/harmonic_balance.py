@@ -1,4 +1,4 @@
-"""Hunting cycles by harmonic balance, compared with the true ones: why the textbook method misleads here."""
+"""Compare limit cycles by harmonic balance with the true ones, to show that the textbook method misleads."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SAMPLES = 16_384
 CYCLE = "the symmetric cycle, closed as an orbit: it attracts where the multiplier is below 1 in size, else it repels"
 APPROXIMATION = "harmonic balance, an approximation"
 PREDICTED = ("solutions", "least_residual")
-"""What the variables are of, by their attribute `of`, and those that single-harmonic balance predicts."""
+"""Attribute `of` of the variables, and the variables that single-harmonic balance predicts."""
 
 HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
 """Default orders of the highest harmonic."""
@@ -103,10 +103,7 @@ def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
 def _errors(
     stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
 ) -> list[tuple[float, float, str]]:
-    """Return relative errors of period and amplitude, and status, for every highest harmonic.
-
-    They are of one stage.
-    """
+    """Return relative errors of period and amplitude of one stage, and the status, for every highest harmonic."""
     single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES
     run = single.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)

@@ -1,5 +1,4 @@
-"""Keep the results of cells until a refined study is done,
-so that repeated questions need no runs."""
+"""Store the results of cells until a refined study is done, so that a resumed study repeats no runs."""
 
 from __future__ import annotations
 
@@ -17,16 +16,16 @@ from friso.studies.study import Study
 
 
 class KeptCells:
-    """Answers about the cells of a study, kept in a folder under the study's digest.
+    """Stored results of cells, in a folder under the study's digest.
 
-    What is damaged there, or belongs to another study, is asked for again.
+    Damaged results, and those of another study, are computed again.
     """
 
     def __init__(self, folder: Path, study: Study, digest: str) -> None:
         self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
 
     def keeping(self, ask: Ask) -> Ask:
-        """`ask` with its answers kept."""
+        """Return `ask` with its answers stored."""
         self.folder.mkdir(exist_ok=True)
         number = count()
 
@@ -42,11 +41,11 @@ class KeptCells:
         return kept_or_asked
 
     def forget(self) -> None:
-        """Remove what was kept: the blocks of the study hold it by now."""
+        """Remove the stored results once the blocks of the study contain them."""
         remove_folder(self.folder)
 
     def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
-        """Return the results kept for exactly these cells, None if there are none."""
+        """Return the results stored for exactly these cells, None without any."""
         forms = {name: np.dtype(form_of(name)) for name in self.metrics}
         most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
         columns = kept_arrays(file, self.digest, most)

@@ -1,7 +1,7 @@
-"""Record the digests of the chunks of each block, in a file per block named after it.
+"""Record the digests of the chunks of each block, in a file per block.
 
-The digests include the study, the block and the variable of a chunk. So exchanged chunks are noticed, unlike with the
-checksums inside them. The file is written last: a block that has one is done.
+The digests include the study, the block and the variable, so exchanged chunks are detected, unlike with checksums
+inside them. The file is written last: a block with a file is complete.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ class Ledger:
     metrics: tuple[str, ...]
 
     def has(self, number: str) -> bool:
-        """Tell whether the block with this number was written."""
+        """Tell whether a block was written."""
         return self._file(number).exists()
 
     def entered(self) -> list[str]:
-        """Return the names in the folder of blocks that were written. Raises OSError."""
+        """Return the names in the folder of written blocks. Raises OSError."""
         return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
 
     def enter(self, number: str) -> None:
-        """Enter a block whose chunks were written. Raises OSError."""
+        """Record a block whose chunks were written. Raises OSError."""
         self._file(number).parent.mkdir(exist_ok=True)
         put(self._file(number), self._entry(number))
 
     def is_whole(self, number: str) -> bool:
-        """Tell whether all chunks of a block are what was written.
+        """Tell whether all chunks of a block are unchanged.
 
         Raises PermissionError if they cannot be read.
         """
@@ -47,9 +47,9 @@ class Ledger:
             return False
 
     def digest(self, number: str, name: str) -> str | None:
-        """Return the digest of a chunk as it was entered.
+        """Return the recorded digest of a chunk.
 
-        None if its block was not entered, "" if the entry is damaged. Raises PermissionError.
+        None if its block was not recorded, "" if the record is damaged. Raises PermissionError.
         """
         try:
             entry = json.loads(stored(self._file(number)))

@@ -30,10 +30,11 @@ _OPERATORS: dict[type, Any] = {
 }
 _FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
 _KEY, _ELEMENT = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+"), re.compile(r"\.([0-9]+)\b")
-"""A key, and the number of an element of an array in it, controller.filters.2.frequency; Python would write [2]."""
+"""Patterns of a key, and of the number of an array element in it, controller.filters.2.frequency; Python would write
+[2]."""
 
 _QUANTITY = re.compile(r"(?<![\w.])[0-9.]+(?:[eE][+-]?[0-9]+)?\s+[^\W\d_][\w/*^²³]*(?:/\([\w*^]+\))?")
-"""A number with a unit, which has no blanks in it: "2 um", "0.5 N*s/m", "3 N/(m*s)"."""
+"""Pattern of a number with a unit, which has no blanks: "2 um", "0.5 N*s/m", "3 N/(m*s)"."""
 
 _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
@@ -98,7 +99,7 @@ def _parsed(key: str, text: str) -> ast.expr:
 
 
 def _check(node: ast.expr) -> None:
-    """Raises ValueError for anything but arithmetic."""
+    """Raise ValueError for anything but arithmetic."""
     match node:
         case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
             _check(left)
@@ -135,7 +136,7 @@ def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
 
 
 def _name(node: ast.expr) -> str:
-    """Return the name of a key or an axis, as a stage file has it."""
+    """Return the name of a key or an axis as in a stage file."""
     match node:
         case ast.Subscript(owner, part):
             return f"{_name(owner)}.{ast.unparse(part)}"

@@ -1,9 +1,8 @@
-"""The metadata of a store: one file (.zmetadata), written at once, with the digest of what it says, and a copy of it,
-which is read where that one is damaged.
+"""Store and check the metadata of a store: one file (.zmetadata) with its digest, and a copy for repair.
 
-Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs.
-These files and the copy are written anew where they do not. What friso notes for itself stands there too: the digests
-of the axes, and for what the figures beside the store are coloured by.
+Zarr's readers take everything but the numbers from it; files beside the arrays repeat it for other programs, and are
+rewritten if they differ. friso's own notes are there too: the digests of the axes, and colours of the figures beside
+the store.
 """
 
 from __future__ import annotations
@@ -29,18 +28,18 @@ from friso.studies.store_files import digest_of, put, stored
 logger = logging.getLogger("friso")
 
 FORMAT = 2
-"""Version of what friso writes into a store."""
+"""Version of friso's metadata in a store."""
 
 _FILE, _COPY, _OWN, _ATTRIBUTES = ".zmetadata", ".zmetadata.copy", "friso", ".zattrs"
-"""The file, its copy, friso's own entry in it, and the entry with the attributes of the study."""
+"""Names of the metadata file, its copy, friso's entry, and the entry with the attributes of the study."""
 
 _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
-"""Names of files beside the arrays and of those of axes: all of them in the store, whatever metadata of others say."""
+"""Patterns of metadata files beside the arrays and of files of axes, the only ones that a store may name."""
 
 _KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"blosc", "crc32"}
-"""Types of numbers and texts, with their size; codecs that only decode."""
+"""Allowed number and text types with their size; allowed codecs, which only decode."""
 _CHUNK = 1 << 30
-"""Size of a chunk in memory at most: the longest axis has no larger one."""
+"""Largest chunk in memory, that of the longest axis."""
 
 _EXPECTED = "a store made by friso map, or a new name"
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
@@ -50,8 +49,8 @@ _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 class Metadata:
     """Metadata of a store.
 
-    They are the contents of Zarr's files beside the arrays, friso's digest of the study as it was made, the SHA-256 of
-    each file of the axes, and notes.
+    They are the contents of Zarr's files beside the arrays, friso's digest of the original study, the SHA-256 of each
+    file of the axes, and notes.
     """
 
     document: Mapping[str, Any]
@@ -66,7 +65,7 @@ class Metadata:
 
     @property
     def all_files(self) -> dict[str, Any]:
-        """Return the metadata with the file that holds them all, and its copy."""
+        """Return the metadata together with the file that combines them, and its copy."""
         return {**self.files, _FILE: self.document, _COPY: self.document}
 
     @property
@@ -75,15 +74,15 @@ class Metadata:
         return dict(self.files[_ATTRIBUTES])
 
     def damaged_files(self, path: Path) -> list[str]:
-        """Return the files of metadata of the store at `path` that do not say the same."""
+        """Return the metadata files of the store at `path` that differ."""
         return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
-        """Return the files of the axes that are not what was written."""
+        """Return the files of the axes that differ from what was written."""
         return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
-        """Write the files of metadata anew that do not say the same. Raises OSError."""
+        """Rewrite metadata files that differ. Raises OSError."""
         for name in self.damaged_files(path):
             if name == _FILE:
                 logger.warning("%s: %s was damaged, and is written anew from its copy", path, name)
@@ -108,7 +107,7 @@ def seal_metadata(path: Path, axes: Iterable[str]) -> None:
 def annotate_metadata(
     path: Path, attributes: Mapping[str, Any] | None = None, notes: Mapping[str, Any] | None = None
 ) -> None:
-    """Add attributes of the study, and notes of friso's own. Raises StoreError, OSError."""
+    """Add attributes of the study, and friso's notes. Raises StoreError, OSError."""
     metadata = checked_metadata(path)
     if attributes:
         files = {**metadata.files, _ATTRIBUTES: {**metadata.attributes, **attributes}}
@@ -125,7 +124,7 @@ def _write(path: Path, metadata: Metadata) -> None:
 
 
 def _text(content: Any) -> bytes:
-    """Return the text of a file of metadata."""
+    """Return the bytes of a metadata file."""
     return json.dumps(content, indent=1, sort_keys=True).encode()
 
 
@@ -147,7 +146,7 @@ def checked_metadata(path: Path) -> Metadata:
 
 
 class _DamagedError(StoreError):
-    """A file with the metadata of a store is damaged or missing: its copy may not be."""
+    """Error: a metadata file of a store is damaged or missing, but its copy may be intact."""
 
 
 def _metadata_in(path: Path, file: str) -> Metadata:
@@ -186,16 +185,16 @@ def _metadata_in(path: Path, file: str) -> Metadata:
 
 
 _WORDS = (b'"equations"', f'"{_OWN}"'.encode())
-"""Keys that stand together in the metadata of stores alone."""
+"""Texts that occur together only in the metadata of stores."""
 
 
 def is_store(path: Path) -> bool:
-    """Tell whether friso made the folder, as far as its metadata tell, damaged or not."""
+    """Tell whether friso made the folder, by its metadata, damaged or not."""
     return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _COPY, _ATTRIBUTES))
 
 
 def _says(file: Path, content: Any) -> bool:
-    """Tell whether a file of JSON says just this: 1 is neither 1.0 nor true."""
+    """Tell whether a JSON file has exactly this content, in which 1 is neither 1.0 nor true."""
     try:
         return digest(json.loads(stored(file))) == digest(content)
     except (OSError, ValueError, RecursionError):
@@ -211,10 +210,10 @@ def _mentions(file: Path, words: bytes) -> bool:
 
 
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
-    """Tell whether the files named by metadata are such as a store has.
+    """Tell whether the files named by metadata are possible in a store.
 
-    None lies elsewhere; arrays hold numbers or texts as friso writes them, because other codecs may run code; and all
-    of each axis is there.
+    None lies elsewhere; arrays are numbers or texts as friso writes them, because other codecs may run code; and each
+    axis is complete.
     """
     if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
         return False
@@ -237,7 +236,7 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
 
 
 def _is_plain(array: Mapping[str, Any]) -> bool:
-    """Tell whether chunks hold numbers or texts, compressed and sized as friso writes them."""
+    """Tell whether an array has numbers or texts, compressed and sized as friso writes them."""
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
     laid_out = (array["order"], array.get("dimension_separator", "."))
@@ -248,7 +247,7 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
 
 
 def _chunks(array: Mapping[str, Any]) -> int:
-    """Return how many chunks an array has."""
+    """Return the number of chunks of an array."""
     return math.prod(-(-length // size) for length, size in zip(array["shape"], array["chunks"], strict=True))
 
 
@@ -258,5 +257,5 @@ def _damaged(path: Path, damage: str) -> _DamagedError:
 
 
 def digest(content: Any) -> str:
-    """Return the SHA-256 of what JSON holds."""
+    """Return the SHA-256 of a JSON value."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

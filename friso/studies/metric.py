@@ -1,7 +1,7 @@
-"""Metrics of a map: what is computed, coloured and told of a cell, each declared in a module of `metrics`.
+"""Define metrics of a map: the computation, colours and words of a cell's value, each in a module of `metrics`.
 
-Such a module has `METRIC` and is called as the metric; installed packages name theirs in the entry points
-`friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` are all read from it.
+Such a module has `METRIC` and the name of the metric; installed packages name theirs in the entry points
+`friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow from it.
 """
 
 from __future__ import annotations
@@ -35,10 +35,9 @@ class RunEvidence:
 
 @dataclass(frozen=True)
 class StageEvidence:
-    """Evidence on the stages of cells.
+    """Evidence on the stages of cells: flat keys, attractors and motions.
 
-    It has their flat keys, their attractors and their motions. `verdicts` simulates more and returns a word for each
-    stage.
+    `verdicts` simulates more and returns a word for each stage.
     """
 
     flat: Mapping[str, Any]
@@ -65,10 +64,9 @@ class Word:
 
 @dataclass(frozen=True)
 class MapFinding:
-    """A statement on a map: the share of cells with one of the `words`, and where they lie.
+    """A statement on a map: the fraction of cells with one of the `words`, and their place.
 
-    For counts, it is the share of cells with more than 0. With `if_any` the statement is left out if no cell has the
-    word.
+    For counts, it is the fraction of cells above 0. With `if_any` the statement is left out if no cell has the word.
     """
 
     clause: str
@@ -154,7 +152,7 @@ class Metric:
         return f"<U{max(9, *(len(word.text) for word in self.words))}" if self.words else "f8"
 
     def attributes(self, kind: AxisKind) -> dict[str, Any]:
-        """Return the attributes of its variable, for stages with that kind of axis."""
+        """Return the attributes of the metric's variable, for stages with that kind of axis."""
         attributes: dict[str, Any] = {} if self.words else {"units": kind.unit(self.unit)}
         attributes |= {} if self.band is None else {kind.suffix("band_m"): self.band}
         return attributes | ({"criterion": kind.text(self.criterion)} if self.criterion else {})
@@ -164,7 +162,7 @@ METRICS: Registry[Metric] = Registry("friso.studies.metrics", "METRIC", "friso.m
 """All metrics, by name."""
 
 STATUS, STATUS_FORM = "status", "<U160"
-"""The variable that says of every cell whether its run was completed, or why not; longer texts are cut."""
+"""Name and type of the variable with the status of every cell: completed, or why not; longer texts are cut."""
 
 
 def metrics() -> dict[str, Metric]:
@@ -178,7 +176,7 @@ def usual_metrics() -> tuple[str, ...]:
 
 
 def with_usual(metric: str) -> tuple[str, ...]:
-    """Return the variables of a study for a map of this metric, with all that cost nothing more."""
+    """Return the variables of a study for a map of a metric, with all others that cost nothing."""
     every = metrics()
     wanted = every[every[metric].shown_as or metric]
     along = [name for name, other in every.items() if other.usual and other.source in ("run", wanted.source)]
@@ -216,6 +214,6 @@ def is_text(variable: str) -> bool:
 
 
 def worded(verdicts: bool = False) -> list[str]:
-    """List the metrics that are words; with `verdicts` the outcome and the verdicts alone."""
+    """List the metrics with words; with `verdicts` only the outcome and the verdicts."""
     every = metrics().items()
     return [name for name, one in every if one.words and (one.verdict or name == "outcome" or not verdicts)]

@@ -1,4 +1,4 @@
-"""Studies in processes of their own on this machine, which are reached over private pipes: no port is opened."""
+"""Compute studies in separate processes on this machine, over private pipes: no port is opened."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 
 _cancel = np.zeros(1, np.int64)
-"""The flag that has this process end its block early; in a worker, memory that is shared with who started it."""
+"""Flag that ends the block of this process early; in a worker, memory shared with its parent."""
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def processes(workers: int) -> Iterator[Crew]:
 def _modules_of_this_folder_ignored() -> Iterator[None]:
     """Start Python processes within the block that import nothing from the current folder.
 
-    The folder may belong to someone else, and hold a file with the name of a module.
+    It may belong to someone else, and contain a file with the name of a module.
     """
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
@@ -63,15 +63,15 @@ _SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def run_block(*arguments: Any) -> Columns:
-    """`run_cells` in a worker, which ends early once the crew says so."""
+    """Run `run_cells` in a worker, until done or cancelled by the crew."""
     return run_cells(*arguments, cancel=_cancel)
 
 
 def _prepare(shared: Any, cache: Path) -> None:
     """Make this process a worker.
 
-    Ctrl-C is left to the process that started it, with which it ends. It uses that process's cache of kernels, even a
-    temporary one.
+    Ctrl-C is left to the parent process, with which it ends. It uses the parent's cache of kernels, even a temporary
+    one.
     """
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)

@@ -1,9 +1,8 @@
-"""Adaptive sampling: what runs do over a grid four times finer per axis, for a fifth of its runs.
+"""Sample adaptively: outcomes over a grid four times finer per axis, for a fifth of its runs.
 
-A lattice of every second cell of the given grid is run first. Wherever neighbouring cells differ, both have to be run,
-until every change of outcome (or of verdict, if that is computed) has been seen from both sides; so a boundary that
-was met once is followed to its end.
-The runs that are left are spent where the next surprise is likely: far from any run, near boundaries, and where runs
+A lattice of every second cell of the given grid is run first. Wherever neighbouring cells differ, both are run, until
+every change of outcome (or of verdict, if computed) has been seen from both sides; so a boundary that was met once is
+followed to its end. Remaining runs go to the most uncertain cells: far from any run, near boundaries, and where runs
 settle late.
 """
 
@@ -26,11 +25,11 @@ from friso.studies.settings import StudySettings
 from friso.studies.study import Dimension, Study
 
 Ask = Callable[[np.ndarray], Columns]
-"""Gives the measures of the cells with these numbers."""
+"""Function that returns the measures of numbered cells."""
 
 
 def finer(study: Study) -> Study:
-    """Return the study on the fine grid. Raises InputError where there is no such grid."""
+    """Return the study on the fine grid. Raises InputError if there is no such grid."""
     if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
         expected = "one to three axes of numbers on a grid"
         raise InputError("--refine", f"axes: {', '.join(study.names)}", expected)
@@ -39,10 +38,7 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """Return the axis with cells between its own.
-
-    The result is as if a range had been given with so many points.
-    """
+    """Return the axis with cells in between, as if a range had been given with so many points."""
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -62,9 +58,9 @@ def asked_for(study: Study) -> Study:
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:
-    """Return the measures of a fine study, each of shape (cells,), from the cells computed.
+    """Return the measures of a fine study, each of shape (cells,), from the computed cells.
 
-    A cell that was not computed has the outcome (and the verdict) of the nearest one that was, a status that says so,
+    A cell that was not computed has the outcome (and the verdict) of the nearest computed one, a status that says so,
     and no numbers.
     """
     settings = StudySettings.current()
@@ -82,14 +78,14 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
 
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
-    """Return numbers of the cells of the coarse lattice, the ends of the axes among them."""
+    """Return the numbers of the cells of the coarse lattice, including the ends of the axes."""
     settings = StudySettings.current()
     lines = [np.unique(np.append(np.arange(0, size, settings.lattice_step), size - 1)) for size in shape]
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
 
 
 class _Grid:
-    """Results of the cells of a study so far, for a grid that is refined."""
+    """Results of the computed cells of a study, on a grid that is refined."""
 
     def __init__(self, study: Study) -> None:
         settings = StudySettings.current()
@@ -102,10 +98,7 @@ class _Grid:
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
-        """Have cells computed, and take over their results.
-
-        Cells that no stage may have cost no run.
-        """
+        """Compute cells, and store their results; invalid cells cost no run."""
         columns = ask(cells)
         for name in columns:
             self.columns.setdefault(name, unfilled(name, self.computed.size))[cells] = columns[name]
@@ -113,7 +106,7 @@ class _Grid:
         self.runs += int(np.sum(columns["outcome"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Distance to the nearest cell computed, and its number, both of the study's shape."""
+        """Return the distance to the nearest computed cell, and its number, both of the study's shape."""
         from scipy.ndimage import distance_transform_edt  # 0.2 s to import
 
         transform: Any = distance_transform_edt(~self.computed, return_indices=True)
@@ -121,10 +114,7 @@ class _Grid:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Return which cells have a neighbour with other words.
-
-        Each cell has the words of the nearest one computed.
-        """
+        """Return which cells have a neighbour with other words, each with the words of the nearest computed cell."""
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)
@@ -136,12 +126,12 @@ class _Grid:
         return changes
 
     def unseen_changes(self) -> np.ndarray:
-        """Return numbers of the cells at a change of words that were not yet computed."""
+        """Return the numbers of cells at a change of words that are not computed yet."""
         _, nearest = self._nearest()
         return np.flatnonzero(self._changes(nearest) & ~self.computed)
 
     def likely_surprises(self, count: int) -> np.ndarray:
-        """Return numbers of up to `count` cells that are most worth a run."""
+        """Return the numbers of up to `count` cells that are most worth a run."""
         settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 
@@ -155,7 +145,7 @@ class _Grid:
         return best[worth.flat[best] > 0]
 
     def filled(self) -> Columns:
-        """Return the measures of all cells, those not computed inferred."""
+        """Return the measures of all cells, with inferred ones for cells not computed."""
         _, nearest = self._nearest()
         guessed = ~self.computed.ravel()
         words = {name: self.columns[name][nearest.ravel()] for name in self.words}

@@ -1,5 +1,4 @@
-"""Read the variations that a user wants into a study, estimate its size,
-and run a trial of it."""
+"""Read a user's variations into a study, estimate its size, and run a trial."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ from friso.studies.samples import SAMPLE, Samples, sample_axes
 from friso.studies.study import Dimension, Study
 
 TRIED = 512
-"""Cells of a trial."""
+"""Cells of a trial run."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
 
 
 def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the variables asked for, by default the usual ones, in their usual order.
+    """Return the requested variables, by default the usual ones, in their usual order.
 
     Raises InputError.
     """

@@ -41,7 +41,7 @@ class Samples:
     seed: int = field(default=0)
 
     def __post_init__(self) -> None:
-        """Raises InputError for fields of other types."""
+        """Check the fields. Raises InputError for other types."""
         settings = StudySettings.current()
         if not isinstance(self.ranges, Mapping):
             raise InputError(

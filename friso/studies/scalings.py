@@ -1,4 +1,4 @@
-"""Axes of a map that multiply several keys at once: how fast the controller is, and how much friction there is."""
+"""Define axes of a map that multiply several keys: speed of the controller, and level of friction."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from friso.studies.links import names
 
 @dataclass(frozen=True)
 class Scaling:
-    """An axis of factors: what is multiplied, in words; how; and the table that a stage needs for that."""
+    """An axis of factors: its words, the scaling, and the table that a stage needs for it."""
 
     words: str
     scaled: Callable[[Mapping[str, Any], Any], dict[str, Any]]
@@ -28,14 +28,14 @@ SCALINGS = {
     "speed": Scaling("Controller speed (times yours)", faster, KIND),
     "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
 }
-"""Scalings by the name of their axis. Factors are of all poles and zeros of the controller, and of every friction
+"""All scalings by the name of their axis. Factors apply to all poles and zeros of the controller, or to every friction
 force."""
 
 
 def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
     """Return stages multiplied by the scaling factors among the columns.
 
-    They are flat keys; a name that links use is a free one. Raises InputError if a stage has nothing to scale.
+    They are flat keys; a name that links use is a free variable. Raises InputError if a stage has nothing to scale.
     """
     for name, scaling in SCALINGS.items():
         if name in columns and name not in names(links):

@@ -1,4 +1,4 @@
-"""A store as Zarr reads it, with metadata and chunks that are checked. Imports zarr, which takes 0.4 s."""
+"""Give Zarr a store with checked metadata and chunks. Imports zarr, which takes 0.4 s."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 class SealedStore(WrapperStore[LocalStore]):
-    """A store whose metadata are taken from `metadata`, whatever its files say.
+    """A store whose metadata come from `metadata`, whatever its files contain.
 
-    Some versions of Zarr read these files one by one, others the one that holds them all. Chunks are those that were
-    written, of blocks that are done.
+    Some versions of Zarr read these files one by one, others the combined one. Chunks must be those recorded for
+    completed blocks.
     """
 
     def __init__(self, store: LocalStore, metadata: Metadata) -> None:
@@ -36,16 +36,16 @@ class SealedStore(WrapperStore[LocalStore]):
 
     @classmethod
     def at(cls, path: Path, metadata: Metadata) -> SealedStore:
-        """Return the store at `path`, to be read alone."""
+        """Return the store at `path`, for reading only."""
         return cls(LocalStore(path, read_only=True), metadata)
 
     def _with_store(self, store: LocalStore) -> SealedStore:
         return type(self)(store, self.metadata)
 
     def with_read_only(self, read_only: bool = False) -> SealedStore:
-        """Return the store, for reading alone or not.
+        """Return the store, read-only or not.
 
-        Zarr before 3.1.6 lacks this for a store of this kind.
+        Zarr before 3.1.6 lacks this for such a store.
         """
         return self._with_store(self._store.with_read_only(read_only))
 
@@ -65,7 +65,7 @@ class SealedStore(WrapperStore[LocalStore]):
         return chunk
 
     def _unread(self, variable: str, number: str, problem: str) -> StoreError:
-        """Return the error of cells of a variable that are damaged, or cannot be read."""
+        """Return the error for cells of a variable that are damaged or unreadable."""
         array, names = (self.files[f"{variable}/{name}"] for name in (".zarray", ".zattrs"))
         cells = ", ".join(
             f"{int(part) * size}:{min((int(part) + 1) * size, length)}"

@@ -1,8 +1,8 @@
-"""A study on disk: a Zarr store that is written block by block and resumed where it was left.
+"""Store a study on disk: a Zarr store that is written block by block and can be resumed.
 
-The store is made whole, without results, aside and then moved into place. A block is done once its digests are entered
-(`friso.studies.ledger`), after its chunks were written, each of which is moved into place by Zarr; one whose chunks are
-others than were entered is run again.
+The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
+recorded (`friso.studies.ledger`), after its chunks were written, each moved into place by Zarr; a block whose chunks
+differ from the record is run again.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ if TYPE_CHECKING:
 logger = logging.getLogger("friso")
 
 _FORMAT = 2
-"""Version of the Zarr format: the one that every reader knows, and in which fixed-length texts are specified."""
+"""Version of the Zarr format that every reader supports, and in which fixed-length texts are specified."""
 
 COORDINATES = "coordinates"
-"""The attribute in which xarray notes the coordinates of no variable alone."""
+"""Attribute in which xarray stores the coordinates that belong to no variable."""
 
 
 class Store:
@@ -96,7 +96,7 @@ class Store:
             yield store
 
     def _replace(self) -> None:
-        """Put this study in place of the store that is there, unless it is this study's already."""
+        """Replace the present store by this study, unless it already is this study's."""
         with lock_store(self.path) as lock:
             try:
                 refuse_other(self.path, self.study)
@@ -106,7 +106,7 @@ class Store:
                 logger.warning("replaced (--overwrite): %s, which held another study, or a damaged one", self.path)
 
     def _fill(self, folder: Path) -> None:
-        """Write the store without results into a folder that is not there yet."""
+        """Write the store without results into a new folder."""
         import xarray as xr
         import zarr
         from numcodecs import CRC32
@@ -154,7 +154,7 @@ class Store:
         return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
     def missing(self) -> Iterator[CellBlock]:
-        """Yield the blocks not yet done, and those that are damaged, which is logged."""
+        """Yield the blocks that are not done, and damaged ones with a log message."""
         ledger = self.ledger
         for block in self.study.blocks(self.blocks):
             number = self._number(block)
@@ -165,19 +165,16 @@ class Store:
                 yield block
 
     def done(self) -> list[str]:
-        """Return the numbers of the blocks that are done.
-
-        Only files that are there count, since a store may state any size.
-        """
+        """Return the numbers of the completed blocks, by existing files, because a store may state any size."""
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
     @property
     def is_done(self) -> bool:
-        """Tell whether all blocks are done, as far as is entered."""
+        """Tell whether all blocks are recorded as done."""
         return len(self.done()) == self._count
 
     def state(self) -> StoreState:
-        """Return how far the study is, what is damaged, and what cannot be read."""
+        """Return the progress of the study, damaged parts, and unreadable parts."""
         ledger, done = self.ledger, self.done()
         damaged: list[str] = []
         unreadable: list[str] = []
@@ -192,7 +189,7 @@ class Store:
 
     @property
     def _counts(self) -> list[int]:
-        """Return how many blocks there are along each axis."""
+        """Return the number of blocks along each axis."""
         return [-(-length // size) for length, size in zip(self.study.shape, self.blocks, strict=True)]
 
     @property
@@ -200,7 +197,7 @@ class Store:
         return math.prod(self._counts)
 
     def _is_of_block(self, number: str) -> bool:
-        """Tell whether a name is that of the files of a block."""
+        """Tell whether a name is that of a block's files."""
         parts = number.split(".")
         return len(parts) == len(self._counts) and all(
             re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
@@ -208,11 +205,11 @@ class Store:
         )
 
     def _number(self, block: CellBlock) -> str:
-        """Return the name of the files of a block."""
+        """Return the name of a block's files."""
         return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
 
     def write(self, block: CellBlock, columns: Mapping[str, np.ndarray]) -> None:
-        """Write the measures of a block and enter it. Raises OSError where the disk is full."""
+        """Write the measures of a block and record it. Raises OSError if the disk is full."""
         import zarr
 
         shape = tuple(part.stop - part.start for part in block)
@@ -226,7 +223,7 @@ class Store:
 
     @property
     def answers(self) -> KeptCells:
-        """Return the results that a refined study keeps until it is done."""
+        """Return the stored results of cells of an unfinished refined study."""
         return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
@@ -239,11 +236,11 @@ class Store:
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
-        """Note something of the store that is no part of the study."""
+        """Add a note on the store that is no part of the study."""
         annotate_metadata(self.path, notes=notes)
 
     def read(self) -> xr.Dataset:
-        """Return the store as a dataset whose values are read when they are looked at."""
+        """Return the store as a dataset whose values are read on access."""
         return read_store(self.path)
 
 
@@ -322,9 +319,9 @@ def holds_all(path: Path, study: Study) -> bool:
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
-    """Return the study of an opened store in memory, with each text once.
+    """Return the study of an opened store in memory, with each distinct text once.
 
-    As stored, a status takes a hundred times the room.
+    As stored, a status takes a hundred times the memory.
     """
     words = [name for name in every_variable() if name in runs and is_text(name)]
     loaded = runs.drop_vars(words).load()
@@ -347,7 +344,7 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
 
 
 def _let_zarr_finish() -> None:
-    """Wait for what Zarr is still writing after one of its writes has failed."""
+    """Wait until Zarr has finished other writes after one of them failed."""
     from zarr.core.sync import sync
 
     async def others() -> None:
@@ -358,7 +355,7 @@ def _let_zarr_finish() -> None:
 
 
 def refuse_other(path: Path, study: Study) -> None:
-    """Raises StoreError if the store holds another study than this."""
+    """Check that a store has this study. Raises StoreError if it has another one."""
     with read_store(path) as dataset:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
@@ -378,7 +375,7 @@ def _warn_of_another_machine(path: Path) -> None:
 
 @contextmanager
 def _refused(path: Path) -> Iterator[None]:
-    """Raises StoreError where a store cannot be written."""
+    """Raise StoreError if a store cannot be written within the block."""
     try:
         yield
     except OSError as error:

@@ -1,5 +1,7 @@
-"""Files of a store, which may come from others: read only where they are regular files of the store itself, and no
-larger than friso writes them."""
+"""Read files of a store safely: only regular files of the store itself, no larger than friso writes them.
+
+A store may come from others.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +23,11 @@ from friso.platform.system import shell_word
 from friso.platform.whole_file import PARTIAL, whole_file
 
 MOST_BYTES = 64 << 20
-"""Size of a file of a store at most: the largest chunk, of texts that nothing compresses, has a sixth of it."""
+"""Largest file of a store. The largest chunk, of incompressible texts, has a sixth of it."""
 
 
 MOST_EXPANDED = 1 << 30
-"""Bytes of the arrays of an archive at most: a few may state many."""
+"""Most bytes of the arrays of an archive, because a small one may claim many."""
 
 
 def stored(file: Path) -> bytes:
@@ -39,7 +41,7 @@ def stored(file: Path) -> bytes:
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
     """Return the SHA-256 of a file of a store, or beside it; None if there is none.
 
-    It is also None for what is no file, or has more than `most` bytes. Raises PermissionError if it cannot be read,
+    It is also None for anything but a file, or more than `most` bytes. Raises PermissionError if it cannot be read,
     which does not mean that it is damaged.
     """
     try:
@@ -53,8 +55,7 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
     """Return the arrays that `keep_arrays` wrote into a file.
 
-    None if they are damaged, are `about` something else, or have more than `most` bytes, of which none is expanded
-    then.
+    None if they are damaged, are `about` something else, or have more than `most` bytes; none is expanded then.
     """
     try:
         content = stored(file)
@@ -91,7 +92,7 @@ def _digest(file: Path, about: str, content: bytes) -> bytes:
 
 
 def put(file: Path, content: bytes) -> None:
-    """Write a file of a store, whole or not at all, readable for whom the user allows.
+    """Write a file of a store completely or not at all, with the user's usual permissions.
 
     Raises OSError.
     """
@@ -100,14 +101,14 @@ def put(file: Path, content: bytes) -> None:
 
 
 BLOCKS, ANSWERS = ".blocks", ".answers"
-"""Folders of a store besides those of its arrays: what was written of each block, what is kept of a refined study."""
+"""Folders of a store besides those of its arrays: records of blocks, and stored results of a refined study."""
 
 _OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
-"""Whether a name is one that Zarr gives, of a copy of its metadata, or of a file that was being written."""
+"""Pattern of names that Zarr gives, of copies of metadata, and of partial files."""
 
 
 def is_of_store(name: str) -> bool:
-    """Tell whether a file of this name within a store is one that friso or Zarr writes."""
+    """Tell whether a name within a store is one that friso or Zarr writes."""
     folder, _, own = name.rpartition("/")
     return _OF_ARRAY(own.removesuffix(".npz") if folder == ANSWERS else own) is not None
 
@@ -115,8 +116,8 @@ def is_of_store(name: str) -> bool:
 def refuse_foreign(path: Path, files: Collection[str]) -> None:
     """Refuse a store with entries that Zarr must not read, nor friso write to.
 
-    The store has such `files` of metadata. Entries refused are links, which may lead elsewhere, devices, pipes, huge
-    files, and files in place of folders or the reverse. Raises StoreError.
+    The store has the given metadata `files`. Refused are links, devices, pipes, huge files, and files in place of
+    folders or the reverse. Raises StoreError.
     """
     folders = {BLOCKS, ANSWERS, *(name.partition("/")[0] for name in files if "/" in name)}
     for entry in _entries(path):
@@ -144,9 +145,9 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
 
 
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
-    """Yield all entries of a folder and of those below it, each folder before its content.
+    """Yield all entries of a folder and its subfolders, each folder before its content.
 
-    They go as deep as a store has files; no link is followed.
+    The depth is that of a store; no link is followed.
     """
     with os.scandir(folder) as entries:
         for entry in entries:

@@ -1,8 +1,7 @@
-"""Manage the folder of a store: make it aside and move it into place, exchange it,
-and lock it for one process.
+"""Manage the folder of a store: make it elsewhere and move it into place, exchange it, and lock it for one process.
 
 The next process repairs the state that a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store
-being made, in a folder with its lock. With `.old` at its end it is a store being replaced.
+being made, in a folder with its lock. With the suffix `.old` it is a store being replaced.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from friso.platform.whole_file import PARTIAL, is_partial
 from friso.studies.store_files import is_of_store
 
 LOCK = ".friso.lock"
-"""The file that is locked while a store is written to."""
+"""Name of the file that is locked while a store is written to."""
 
 _OLD = ".old"
 
@@ -32,7 +31,7 @@ _DIGITS = "[0-9a-f]" * 32
 
 
 class ReadOnlyStoreError(StoreError):
-    """Nothing can be written into a store."""
+    """Error: a store cannot be written."""
 
 
 def where_links_lead(path: Path) -> Path:
@@ -62,10 +61,9 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
 
 
 def refuse_others_files(path: Path) -> None:
-    """Refuse to replace a store whose folder holds other files: they would go with it.
+    """Refuse to replace a store whose folder has other files, which would be deleted with it.
 
-    Raises:
-        StoreError: naming the first of what friso did not write.
+    Raises: StoreError: naming the first of what friso did not write.
     """
     others = []
     for item in sorted(path.iterdir()):
@@ -81,10 +79,10 @@ def refuse_others_files(path: Path) -> None:
 
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
-    """Replace the store at `path` by what `fill` writes.
+    """Replace the store at `path` by one that `fill` writes.
 
-    Its lock is held, and it is deleted once the new one is in place. Raises OSError, with the store as it was. Ctrl-C
-    waits until one of the two is there.
+    Its lock is held, and it is deleted once the new one is in place. Raises OSError, with the store unchanged. Ctrl-C
+    waits until one of the two is in place.
     """
     with _made_aside(path, fill) as new, hold_interrupts():
         old = _free_name(path, _OLD)
@@ -100,10 +98,10 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove what killed processes left beside the store at `path`.
+    """Remove leftovers of killed processes beside the store at `path`.
 
-    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if it cannot
-    be put back.
+    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if it cannot be
+    put back.
     """
     path = Path(os.path.realpath(path))
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
@@ -117,9 +115,9 @@ def remove_leftovers(path: Path) -> None:
 
 
 def remove_partial_files(path: Path) -> None:
-    """Remove files from a locked store that a killed process was writing.
+    """Remove partial files of a killed process from a locked store.
 
-    Whoever writes into a store holds its lock.
+    Every writer holds the lock.
     """
     for file in (*path.glob(f"*{PARTIAL}"), *path.glob(f"*/*{PARTIAL}")):
         if is_partial(file) and file.is_file():
@@ -130,7 +128,7 @@ def remove_partial_files(path: Path) -> None:
 def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
     """Keep other processes out of a store; return the lock.
 
-    Raises StoreError if another one is in it after `patience` [s], ReadOnlyStoreError if nothing can be written.
+    Raises StoreError if another one is still in it after `patience` [s], ReadOnlyStoreError if nothing can be written.
     """
     lock = FileLock(path / LOCK)
     try:
@@ -149,9 +147,9 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """Return what `fill` has written, to be moved away.
+    """Return the folder that `fill` has written, to be moved away.
 
-    Ctrl-C waits for its end: otherwise the threads of Zarr would go on writing into what is deleted here.
+    Ctrl-C waits for its end: otherwise the threads of Zarr would write on into a deleted folder.
     """
     draft = _free_name(path)
     try:
@@ -166,5 +164,5 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:
-    """Return a name that is free."""
+    """Return an unused name."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

@@ -1,4 +1,4 @@
-"""A study as data: a stage, what is varied in it, and how exactly; its cells and its blocks of cells."""
+"""Define a study as data: a stage, its variations and tolerance; its cells and blocks of cells."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CellBlock = tuple[slice, ...]
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension of the result: one axis, or several that run side by side (samples)."""
+    """A dimension of the result: one axis, or several that vary together (samples)."""
 
     name: str
     axes: tuple[SweptAxis, ...]
@@ -43,7 +43,10 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Study:
-    """All that decides on the result: cells are the combinations of the dimensions' values, in C order."""
+    """A study: all inputs that determine the result.
+
+    Cells are the combinations of the dimensions' values, in C order.
+    """
 
     stage: Stage
     dimensions: tuple[Dimension, ...]
@@ -64,7 +67,7 @@ class Study:
 
     @property
     def cycles(self) -> bool:
-        """Tell whether anything is wanted that needs a survey of what attracts."""
+        """Tell whether any requested metric needs a survey of attractors."""
         every = metrics()
         return any(name in every and every[name].source == "survey" for name in self.metrics)
 
@@ -100,7 +103,7 @@ class Study:
     def block_shape(self, target: int) -> tuple[int, ...]:
         """Return the shape of blocks of about `target` cells.
 
-        They have whole trailing dimensions, and an equal share of the one before.
+        They have whole trailing dimensions, and an equal part of the one before.
         """
         shape = [1] * len(self.shape)
         for i in reversed(range(len(shape))):
@@ -111,13 +114,13 @@ class Study:
         return tuple(shape)
 
     def blocks(self, shape: Sequence[int]) -> Iterator[CellBlock]:
-        """Yield all blocks of a shape, those at the ends cut to fit."""
+        """Yield all blocks of a shape; those at the ends are cut to fit."""
         starts = (range(0, size, step) for size, step in zip(self.shape, shape, strict=True))
         for corner in product(*starts):
             yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
-        """Return the stage of one cell, which run alone gives the same numbers.
+        """Return the stage of one cell, which run alone gives equal numbers.
 
         Raises InputError for an invalid cell.
         """
@@ -133,7 +136,7 @@ class Study:
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
-        """Return a study of just these cells, side by side."""
+        """Return a study of only these cells, side by side."""
         columns = self.columns(cells)
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
@@ -141,7 +144,7 @@ class Study:
         return replace(self, dimensions=(Dimension(SAMPLE, axes),), refined=False)
 
     def coordinates(self) -> dict[str, Any]:
-        """Coordinates for xarray: SI values with units and scale."""
+        """Return coordinates for xarray: SI values with units and scale."""
         coordinates: dict[str, Any] = {}
         for dimension in self.dimensions:
             if dimension.name == SAMPLE:
@@ -207,16 +210,16 @@ _DECISIVE = (
     *("quantities.py", "stage", "equations", "engine", "hunting", "studies/metrics"),
     *(f"studies/{name}.py" for name in _STUDIES),
 )
-"""Parts of the package that decide on the numbers of a cell, or on which cells a refined study runs."""
+"""Parts of the package that determine the numbers of a cell, or the cells that a refined study runs."""
 
 
 def equations_version() -> str:
-    """Return a digest of friso's own code that decides on the numbers of a cell."""
+    """Return a digest of friso's code that determines the numbers of a cell."""
     return f"{VERSION} ({code_digest(*_DECISIVE)[:12]})"
 
 
 def study_of(runs: xr.Dataset) -> Study:
-    """Return the study that a dataset or an opened store holds the results of."""
+    """Return the study whose results are in a dataset or an opened store."""
     dimensions, order = [], json.loads(runs.attrs["axes"])
     for name in runs["outcome"].dims:
         axes = tuple(_stored_axis(runs[axis]) for axis in order if runs[axis].dims == (name,))

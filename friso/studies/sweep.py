@@ -1,4 +1,4 @@
-"""Parameter studies: every cell of a study run, as an xarray Dataset in memory or in a store that can be resumed."""
+"""Run parameter studies into an xarray Dataset in memory, or into a store that can be resumed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def sweep(
     it is not certain); and the verdict on the stage ("hunts", "bistable", "transient", "settles" or "failed"). The
     attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
 
-    An outcome is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
+    An outcome is as good as its tolerance: with `verify` that fraction of the cells is run again at rtol/100, and the
     attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the
     grid is made four times finer, of which a fifth is run, along the changes of outcome (and of verdict, if it is asked
     for); the other cells are inferred, which their status says. With `store`, a folder, results are written there in
@@ -78,7 +78,7 @@ def sweep(
 def run_in_memory(
     studies: Sequence[Study], crew: Crew, verify: float = 0.0, progress: Progress = silent
 ) -> list[xr.Dataset]:
-    """Run studies side by side, verify a share of each, and return them as datasets.
+    """Run studies side by side, verify a fraction of each, and return them as datasets.
 
     Refined studies are run one by one.
     """
@@ -100,16 +100,16 @@ def run_in_memory(
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of a study's store, verify a share, and return the opened store.
+    """Run the missing blocks of a study's store, verify a fraction, and return the opened store.
 
-    It is created if it is not there. Raises InputError.
+    The store is created if necessary. Raises InputError.
     """
     with Store.opened(path, study) as store:
         return fill(store, crew, verify, progress)
 
 
 def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run what an opened store lacks, block by block, and verify a share; its dataset."""
+    """Run the missing blocks of an opened store, verify a fraction, and return its dataset."""
     study, missing = store.study, list(store.missing())
     tally = Tally(progress, study.cells)
     tally.add(study.cells - sum(map(cells_of, missing)), CELLS)

@@ -27,18 +27,18 @@ TRIED = 400
 
 
 def checked_share(share: float) -> float:
-    """Return the share of cells to verify. Raises InputError for one that is none."""
+    """Return the fraction of cells to verify. Raises InputError for one that is none."""
     if not 0 <= share <= 1:
         raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
 
 
 def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a share of the cells again at rtol/100; return attributes with the share that survived.
+    """Run a fraction of the cells again at rtol/100; return attributes with the fraction that survived.
 
     The cells are the same for the same study. Of a refined map, inferred cells are run too, and counted apart
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
-    stated if there are no others, no share was asked for, or the attributes of the runs state it.
+    stated if there are no others, no fraction was asked for, or the attributes of the runs state it.
     """
     settings = StudySettings.current()
     if (
@@ -81,7 +81,7 @@ def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
     """Return the loosest tolerance at which `WANTED` of the outcomes survive.
 
-    Also returns the surviving share at each tolerance tried, and the number of cells used. If no cell has a stage,
+    Also returns the surviving fraction at each tolerance tried, and the number of cells used. If no cell has a stage,
     there are none, and the tightest tolerance is returned. If no tolerance is good enough, it is the one at which most
     survive.
     """

@@ -11,15 +11,15 @@ from friso.errors import InputError
 from friso.stage.rig import Floor
 
 FLOOR = int.from_bytes(b"floor")
-"""Which of a seed's random numbers: Philox takes them as the second half of its key."""
+"""Second half of the Philox key for random numbers of the floor."""
 
 
 def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int) -> np.ndarray:
     """Return a random acceleration of the floor [m/s^2] every `interval` up to `duration` [s].
 
-    Its shape is (n,), from time 0 on. There is one wave per frequency of the Fourier transform, with the variance that
-    the spectrum has in the band around it; so the variance is that of the spectrum however short the record is. Raises
-    InputError for a spectrum that reaches beyond half the sampling frequency.
+    Its shape is (n,), from time 0 on. There is one wave per frequency of the Fourier transform. The variance of each
+    wave is that of the spectrum in the band around it, so the total variance does not depend on the length of the
+    record. Raises InputError for a spectrum that reaches beyond half the sampling frequency.
     """
     highest = floor.frequency[-1]
     if highest * interval > 0.5:

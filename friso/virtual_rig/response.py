@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LOGGED = {"position": ("measured_position", "m", "position that the drive reads"), "force": ("command", "N", "command")}
-"""What the drive logs beside what really moves: name of a signal, unit and label."""
+"""Name, unit and label of each signal that the drive logs besides the true motion."""
 
 
 def response(stage: Stage, rtol: float | None = None, sample_time: float | None = None, seed: int = 0) -> xr.Dataset:
     """Run a stage's own motion on its drive as built, and return its time response.
 
-    Variables over `time` [s] are those of `friso.engine.simulate`, and what the drive reads and commands. Samples are
-    taken with the drive, by default some twenty thousand of them. The noise is that of a `seed`. Raises InputError for
-    a sample time that is no whole number of the drive's samples.
+    Variables over `time` [s] are those of `friso.engine.simulate`, the encoder reading and the command. Samples
+    coincide with the drive's; by default there are some twenty thousand. Noise is drawn from `seed`. Raises InputError
+    for a sample time that is not a multiple of the drive's.
     """
     flat = as_built_keys(stage)
     settings = RigSettings.current()
@@ -50,7 +50,7 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
 
 
 def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
-    """Measure recorded runs of the stages `flat`; the force is what the drive commands."""
+    """Return the measures of recorded runs of the stages `flat`; the force is the drive's command."""
     attempted, rejected = (
         recorded.statistics[:, STATISTICS.index(name)].astype(np.int64) for name in ("attempted", "rejected")
     )
@@ -60,7 +60,7 @@ def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
 
 
 def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
-    """Measure the run of a `response`."""
+    """Return the measures of the run in a `response`."""
     time, status = response["time"].to_numpy(), {one.text: one for one in Status}[response.attrs["status"]]
     deviation = (response["position"] - response["reference"]).to_numpy()[None]
     counts = (np.array([value]) for value in (status, response.attrs["steps"], response.attrs["rejected"]))

@@ -23,11 +23,11 @@ from friso.virtual_rig.surroundings import tables
 from friso.virtual_rig.task import SAMPLE_TIME, MoveTask
 
 METHOD = "Rodas4"
-"""Relative tolerance and method: a step is at most a sample long."""
+"""Method of integration; a step is at most one sample long."""
 
 
 SENSOR = int.from_bytes(b"sensor")
-"""Which of a seed's random numbers the sensor between cart and stage takes."""
+"""Seed offset for the noise of the sensor between cart and stage."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class RecordedRuns:
 
 
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the flat keys of a stage with a complete drive; what is not stated is ideal.
+    """Return the flat keys of a stage with a complete drive; unstated properties are ideal.
 
     `changes` are SI numbers, or arrays with one for each run.
     """
@@ -63,7 +63,7 @@ def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dic
 
 
 def with_complete_drive(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys with those of a complete drive: what it does not tell is ideal."""
+    """Return flat keys completed by those of an ideal drive."""
     flat = anywhere(flat)
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": flat.get("drive.integrator_reset", False) * 1.0}
@@ -209,7 +209,10 @@ def _outputs(
 
 
 def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return a table, evenly spaced, at places counted in its points; the ends go on."""
+    """Interpolate an evenly spaced table at places counted in its points.
+
+    Beyond its ends the table keeps its end values.
+    """
     return np.interp(place, np.arange(len(table)), table)
 
 
@@ -252,7 +255,7 @@ def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
 
 
 def failures(recorded: RecordedRuns) -> list[tuple[int, str]]:
-    """Return numbers of the runs that failed, and why."""
+    """Return number and reason of each failed run."""
     failed = recorded.statuses != Status.DONE
     return [
         (int(n), Status(int(s)).text) for n, s in zip(recorded.numbers[failed], recorded.statuses[failed], strict=True)

@@ -36,7 +36,7 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
     """Return evenly spaced places [m] of tables, and their grid, shape (1, 2).
 
-    The grid holds the first place and the points per metre.
+    The grid holds the first place [m] and the points per metre.
     """
     settings = RigSettings.current()
     low, high = task.span
@@ -56,7 +56,7 @@ def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.nda
 
 
 def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
-    """Factors of static and Coulomb friction and of the motor constant, shape (3, places)."""
+    """Return factors of static friction, Coulomb friction and motor constant, shape (3, places)."""
     ripple = 1 + flat.get("drive.ripple", 0.0) * np.cos(2 * np.pi * places / flat.get("drive.ripple_pitch", np.inf))
     return np.array([*friction_factors(flat, places), ripple])
 

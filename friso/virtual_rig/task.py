@@ -1,5 +1,4 @@
-"""Define the task of a drive: a reference in pieces of parabola,
-and a force injected beside the controller's."""
+"""Define the task of a drive: a reference and an injected force."""
 
 from __future__ import annotations
 
@@ -16,7 +15,7 @@ from friso.stage import Stage
 from friso.stage.motion import QUADRATIC, ReferenceForm
 
 SAMPLE_TIME = 50e-6
-"""Sample time of a drive that states none [s]: that of the thesis (Sec. 3.5.2)."""
+"""Sample time [s] of a drive that states none: that of the thesis (Sec. 3.5.2)."""
 
 
 @dataclass(frozen=True)
@@ -49,16 +48,16 @@ class MoveTask:
         return float(min(places.min(), np.min(begins))), float(max(places.max(), np.max(begins)))
 
     def of_runs(self, numbers: np.ndarray) -> MoveTask:
-        """Return the task of some of the runs."""
+        """Return the task restricted to some of the runs, by number."""
         own = self.pieces[numbers] if self.pieces.ndim > 2 else self.pieces
         displacement = self.displacement[numbers] if np.ndim(self.displacement) else self.displacement
         return replace(self, pieces=own, displacement=displacement)
 
 
 def own_motion(stage: Stage) -> MoveTask:
-    """Return the motion of the stage file, which starts at 0 or displaced from there.
+    """Return the motion of the stage file, which starts at 0 or at a displacement.
 
-    The reference of a step starts there too, and leaves after one sample of the drive.
+    The reference of a step starts there as well, and jumps after one sample of the drive.
     """
     return motion_task(stage.flat(), 1)
 
@@ -66,7 +65,7 @@ def own_motion(stage: Stage) -> MoveTask:
 def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
     """Return the motions of stages given as flat keys (see `own_motion`).
 
-    They have the longest of their durations.
+    All runs have the longest duration.
     """
     several = motion.varies(flat)
     pieces = motion.pieces(flat, runs if several else 1)
@@ -84,7 +83,7 @@ def standing(place: float, duration: float) -> MoveTask:
 
 
 def staircase(steps: Sequence[float], stands: float) -> MoveTask:
-    """Return a reference of steps [m] from 0 on, standing for a time [s] around each."""
+    """Return a reference of steps [m] in turn from 0, standing for a time [s] before and after each."""
     places = np.cumsum([0.0, *steps])
     rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
     return MoveTask(np.array(rows), stands * len(places))
@@ -93,7 +92,7 @@ def staircase(steps: Sequence[float], stands: float) -> MoveTask:
 def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
     """Return a reference of constant velocities [m/s] in turn, each for a time [s].
 
-    It begins at a place [m]; a velocity of 0 is a standstill.
+    It begins at `start` [m]; a velocity of 0 is a standstill.
     """
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
@@ -102,7 +101,7 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 
 
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
-    """Return a reference of moves from place to place [m], standing for a time [s] after each.
+    """Return a reference that moves from place to place [m], standing for a time [s] after each move.
 
     Acceleration [m/s^2] and speed [m/s] are bounded.
     """

@@ -1,1 +1,1 @@
-"""The commands of this package, a module each, which pyproject.toml names to friso in entry points."""
+"""The commands of this package, one module each, which pyproject.toml declares as entry points of friso."""

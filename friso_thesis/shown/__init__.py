@@ -1,1 +1,1 @@
-"""What a person sees of it: words, figures, documents and pages by command, templates beside them."""
+"""Show results to people: words, figures, documents and pages by command, with their templates."""

@@ -21,15 +21,17 @@ from friso.studies.study import equations_version
 
 @dataclass(frozen=True)
 class KeptWork:
-    """Folder in which pieces of work are kept; None keeps nothing.
+    """Folder in which pieces of work are saved; None saves nothing.
 
-    Pieces that were made by other code, or are damaged, are made again.
+    Pieces that are damaged, or were computed by other code, are computed again.
     """
 
     folder: Path | None = None
 
     sources: ClassVar[tuple[str, ...]]
-    """Folders and files that decide on what is kept, beside those of the equations, as paths from the package friso."""
+    """Folders and files, besides the equations, whose contents decide on saved results.
+
+    Paths start from the package friso."""
 
     @property
     def count(self) -> int:
@@ -39,7 +41,7 @@ class KeptWork:
         return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
 
     def clear(self) -> None:
-        """Forget them."""
+        """Delete all saved pieces."""
         if self.folder is not None:
             remove_folder(self.folder)
 

@@ -42,7 +42,7 @@ def example(
 
 
 def named_files(source: Path) -> list[Path]:
-    """The files beside an example that its tables name."""
+    """Return the files beside an example that its tables name."""
     import tomllib
 
     tables = tomllib.loads(source.read_text("utf-8")).values() if source.suffix == ".toml" else ()
@@ -50,7 +50,7 @@ def named_files(source: Path) -> list[Path]:
 
 
 def listed_examples() -> list[tuple[str, str]]:
-    """The examples, each by the name of its stage, or by what it is for."""
+    """Return the examples, each with the name of its stage, or with its purpose."""
     import tomllib
 
     from friso.interface.starting import example as example_path
@@ -64,7 +64,7 @@ def listed_examples() -> list[tuple[str, str]]:
 
 
 PARAMETERS = "Parameters of a drive, for friso init --from"
-"""What is said of an example that is no stage file."""
+"""Description of an example that is not a stage file."""
 
 
 COMMAND = Command(example, 145, HELP, Choices("Examples", listed_examples))

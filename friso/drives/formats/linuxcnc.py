@@ -30,13 +30,13 @@ FORCE_FIELD = Quantity("N", positive, "20 N")
 VELOCITY_FIELD = Quantity("m/s", positive, "5 mm/s")
 
 UNITY = (0.9, 1.1)
-"""FF1 [machine units/s per unit of output] of a drive whose output is taken to be in machine units per second."""
+"""Range of FF1 [machine units/s per unit of output] for which the output counts as machine units per second."""
 
 TARGET = "error-previous-target, with which the error is taken from the command of the sample before"
 
 LENGTHS = {"mm": 1e-3, "metric": 1e-3, "inch": 0.0254, "in": 0.0254, "imperial": 0.0254, "m": 1.0, "cm": 1e-2}
 ANGLES = {"deg": 0.017453292519943295, "degree": 0.017453292519943295, "rad": 1.0, "radian": 1.0}
-"""Machine units in metres and radians."""
+"""Machine units of linear axes in metres (`LENGTHS`), and of rotary axes in radians (`ANGLES`)."""
 
 ROTARY = KINDS["rotary"]
 NOT_CARRIED = {
@@ -49,7 +49,7 @@ NOT_CARRIED = {
     "OUTPUT_OFFSET": "OUTPUT_OFFSET = {:g}, what is taken from the output of pid",
 }
 OUTPUT_SCALE = "OUTPUT_SCALE"
-"""By what a HAL file may divide the output of `pid`, so that an output of 1 is not 1 V of an amplifier."""
+"""Name of the divisor of the `pid` output in a HAL file; with it an output of 1 is not 1 V of an amplifier."""
 
 DOCUMENTED = re.compile(
     r"TYPE|UNITS|MAX_(?:VELOCITY|ACCELERATION|JERK|OUTPUT|ERROR|ERROR_I|ERROR_D)|BACKLASH|COMP_FILE(?:_TYPE)?|"
@@ -57,33 +57,35 @@ DOCUMENTED = re.compile(
     r"FF[0-3]|CYCLE_TIME|"
     r"(?:OUTPUT|INPUT|ENCODER|STEP)\w*|SCALE|DIR(?:SETUP|HOLD)|PWM\w*|DAC\w*|MOTOR\w*"
 )
-"""Names in the section of a joint that the manual has, and those of what stands between `pid` and the machine."""
+"""Pattern of documented names in the section of a joint, and of parameters between `pid` and the machine."""
 
 MOST_LINES = 100_000
 MOST_INCLUDED = 100
-"""Lines, and files that are taken in, at most."""
+"""Largest number of included files; `MOST_LINES` limits the lines."""
 
 _AXIS = r"(?:JOINT|AXIS)_[0-9]{1,3}"
-"""The name of a section with the parameters of an axis."""
+"""Pattern of the name of a section with the parameters of an axis."""
 
 _CONTINUED = re.compile(r"\\\r?\n")
-"""The end of a line that goes on in the next one."""
+"""Pattern of the end of a line that continues in the next one."""
 
 _COMMENT = re.compile(r"\s[#;]")
-"""How a comment begins behind a value."""
+"""Pattern of the start of a comment after a value."""
 
 _INCLUDE = re.compile(r"^#INCLUDE[ \t]+(\S{1,200})[ \t]*$", re.MULTILINE)
-"""A line that takes in another file, which may not take in others."""
+"""Pattern of a line that includes another file; included files may include none."""
 
 _HEADING = re.compile(r"\[([^\[\]]*)\][ \t]*(?:[#;].*)?")
 _READ = re.compile(r"(?:JOINT|AXIS)_[0-9]{1,3}|TRAJ|EMCMOT")
-"""How a section begins, and the names of those of which every line has to be understood."""
+"""Pattern of the names of sections in which every line must be understood."""
 
 TYPES = ("LINEAR", "ANGULAR")
 
 INCLUDED = "#INCLUDE"
 REPEATED = "#REPEATED"
-"""Names of an entry of `AxisParameters.machine` that no variable has, as these begin comments."""
+"""Key of `AxisParameters.machine` for repeated names.
+
+No variable has this name, since # begins a comment."""
 
 HELD = frozenset(
     {
@@ -98,7 +100,7 @@ HELD = frozenset(
     }
 )
 HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforward", "error_deadband"))
-"""Names in [controller] that the parameters hold; the velocity loop is the drive's."""
+"""Names in [controller] that the parameters hold; the velocity loop belongs to the drive."""
 
 
 def recognises(name: str, text: str) -> bool:

@@ -28,11 +28,11 @@ from friso.stage.lists import row_keys
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
 RATE = 8000.0
-"""Samples of the controller in a second, of ODrive 3."""
+"""Samples of the controller per second, in ODrive 3."""
 
 CONTROL_MODES = ("VOLTAGE_CONTROL", "TORQUE_CONTROL", "VELOCITY_CONTROL", "POSITION_CONTROL")
 POSITION_CONTROL = CONTROL_MODES.index("POSITION_CONTROL")
-"""Value of control_mode, and how the values are called."""
+"""Value of control_mode for position control, an index of `CONTROL_MODES`."""
 
 INPUT_MODES = (
     *("INACTIVE", "PASSTHROUGH", "VEL_RAMP", "POS_FILTER", "MIX_CHANNELS"),
@@ -40,7 +40,7 @@ INPUT_MODES = (
 )
 PASSTHROUGH, POSITION_FILTER, TRAJECTORY = map(INPUT_MODES.index, ("PASSTHROUGH", "POS_FILTER", "TRAP_TRAJ"))
 AHEAD = (POSITION_FILTER, TRAJECTORY)
-"""Values of input_mode, and how they are called; `AHEAD`, those in which the drive feeds its own reference forward."""
+"""Values of input_mode in which the drive feeds its own reference forward."""
 
 
 def _symbols(modes: tuple[str, ...], *before: str) -> dict[str, float]:
@@ -88,38 +88,42 @@ OTHERS = frozenset(
     ]
 )
 KNOWN = OTHERS.union(GAINS)
-"""Names in controller.config of these firmwares; `OTHERS` are those beside the gains."""
+"""Names in controller.config of the supported firmwares."""
 
 HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral_limit"})
 """Names in [controller] that the parameters hold."""
 
 FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
-"""Names in [controller] that parameters hold if the drive's own trajectories feed them forward."""
+"""Names in [controller] that parameters hold if the drive's own trajectories are fed forward."""
 
 
 _LINE = re.compile(r"[ \t]*(odrv[0-9]{1,3})\.([\w.]{1,200})[ \t]*=(?!=)[ \t]*([^#]*)(?:#.*)?")
-"""A line for odrivetool that sets a parameter; of a comment behind it, nothing."""
+"""Pattern of a line for odrivetool that sets a parameter; a comment after it is ignored."""
 
 _OTHER_LINE = re.compile(
     r"[ \t]*(?:$|#|import |from |odrv[0-9]{1,3}(?:[ \t]*=[ \t]*odrive\.\w+|(?:\.\w+)+)\([^()#]*\)[ \t]*(?:#|$))"
 )
-"""A line that sets none: empty, a comment, an import, or a call such as odrv0.save_configuration()."""
+"""Pattern of a line that sets no parameter.
+
+It is empty, a comment, an import, or a call such as odrv0.save_configuration()."""
 
 _OF_AXIS = re.compile(r"(?:(odrv[0-9]+)\.)?(axis[0-9]+)\.(.*)")
-"""The place of a parameter: drive, axis, and its name there."""
+"""Pattern of the place of a parameter: drive, axis, and name."""
 
 _MODULE = re.compile(r"^(?:odrive\.)?enums\.")
 
 IN_TURNS = "motor.config.torque_constant"
-"""A parameter that firmware has whose gains are in turns and N m."""
+"""A parameter whose presence shows that the gains are in turns and N m."""
 
 OLD = frozenset({"setpoints_in_cpr", "A_per_css", "counts_per_step", "current_ramp_rate", "CTRL_MODE"})
 NEW = frozenset({"torque_lim", "torque_ramp_rate", "turns_per_step", "input_mode", "CONTROL_MODE", "ControlMode"})
 NEWEST = frozenset({"config.motor", "config.encoder_bandwidth", "config.torque_soft_max"})
-"""Names that only firmware up to 0.4 has, whose gains are in counts; only 0.5, in turns; only 0.6, with others."""
+"""Names that occur only in firmware up to 0.4 (`OLD`), from 0.5 (`NEW`), and from 0.6 (`NEWEST`).
+
+Firmware up to 0.4 has gains in counts; 0.5 has gains in turns."""
 
 FASTEST = 1000.0
-"""Turns per second that no motor makes: a limit above is one in counts."""
+"""Speed in turns per second beyond any motor; a higher limit must be in counts."""
 
 TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6"
 IN_TURNS_INSTEAD = (
@@ -127,7 +131,7 @@ IN_TURNS_INSTEAD = (
 )
 
 GAINS_IN, TURNS, COUNTS = "gains_in", "turns", "counts"
-"""Answer of the user, and its choices, if nothing in a file reveals the firmware."""
+"""Key and choices of the user's answer about the firmware, if the file does not reveal it."""
 
 _RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ \t]*=(?!=)", re.MULTILINE)
 

@@ -1,4 +1,4 @@
-"""Controllers, one file each; every module in this folder is imported, and registers the controller it declares."""
+"""Controllers, one file each; importing this package registers the controllers of all its modules."""
 
 from importlib import import_module
 from pkgutil import iter_modules

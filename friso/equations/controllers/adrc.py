@@ -115,24 +115,24 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """The observer, then the feedback of its states."""
+        """Draw the observer, then the feedback of its states."""
         canvas.box("observer: e1, e2, e3")
         canvas.box("m (w_c^2 e1 + 2 w_c e2 + e3)")
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Always: the disturbance that it estimates is an integral."""
+        """Return True: the estimated disturbance is an integral."""
         return True
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
-        """Return the static stiffness of the filter beside the integral [N/m]."""
+        """Return the static stiffness of the filter in parallel with the integral [N/m]."""
         parts = _parts(blocks)
         return parts.proportional / parts.d0
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
-        """Return the two shares [N]."""
+        """Return the integral and the filtered part of the force [N]."""
         integral, lead, proportional, d1, d0 = _parts(blocks)
         upper, lower = (proportional / d0, lead / d0, 0), (1, d1 / d0, 1 / d0)
         return {

@@ -35,7 +35,7 @@ FEEDFORWARD = (
 
 
 SLOWER = 4.0
-"""Integral time in units of 1/kv, of an integral to begin with."""
+"""Initial integral time of a loop, in units of 1/kv."""
 
 
 class CascadeTerms(NamedTuple):
@@ -117,7 +117,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> CascadeTerms:
-        """Return which terms there are."""
+        """Return which terms the controller has."""
         return CascadeTerms(
             position_integral=POSITION_TIME in flat,
             velocity_integral=VELOCITY_TIME in flat,
@@ -128,9 +128,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try: integral in the other loop, feedforward, no integral.
+        """Return other structures to try.
 
-        Pseudo-derivative feedback, or none, is another.
+        They move the integral to the other loop, add feedforward, drop the integral, and toggle pseudo-derivative
+        feedback.
         """
         listed: dict[str, Mapping[str, Any]] = {}
         outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)
@@ -168,7 +169,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """A sum for each loop."""
+        """Draw one summing point per loop."""
         canvas.box("kv (1 + 1/(Tp s))" if POSITION_TIME in flat else "kv")
         if flat[cls.key("velocity_feedforward")]:
             canvas.sum(below="f dr/dt", minus=False)
@@ -187,9 +188,9 @@ class Cascade(ControllerSection):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: CascadeTerms) -> sp.Expr:
-        """Return the force on a stage that is displaced quickly [N/m].
+        """Return the proportional stiffness against fast displacements of the stage [N/m].
 
-        The integral of its velocity is its displacement.
+        The integral of the velocity loop counts, because the integral of velocity is displacement.
         """
         rate = blocks.key("kv") if variant.proportional_on == "error" else 0
         rate = rate + (1 / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)

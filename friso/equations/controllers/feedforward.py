@@ -1,4 +1,4 @@
-"""What controllers feed forward to the force: in a table of gains, and in the drawing of a loop."""
+"""Describe the feedforward terms of controllers in tables of gains and in drawings of loops."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ TERMS = {
 
 
 def fed_forward(flat: Mapping[str, Any]) -> str:
-    """Return the terms that there are; empty without any."""
+    """Return the feedforward terms of a controller in words; empty without any."""
     return " + ".join(term for name, term in TERMS.items() if flat.get(ControllerSection.key(name)))
 
 
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
     """Return the feedforward that moving mass and viscous friction need, by key [SI].
 
-    Only those `names` are included that the controller lacks.
+    Keys that the controller does not have are left out.
     """
     needed = {"acceleration_feedforward": moving_mass(flat), "viscous_feedforward": flat.get("friction.viscous", 0.0)}
     return {

@@ -1,4 +1,4 @@
-"""What the two forms of the PID controller share: their kind, and how their tables are distinguished."""
+"""Define the base of the two forms of the PID controller, and tell the forms apart."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ class Pid(ControllerSection):
     needed: ClassVar[tuple[str, ...]]
     """Names of the keys of which a table of this form has at least one."""
     asked: ClassVar[str]
-    """These keys in a message."""
+    """The needed keys, as written in a message."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({"p": "proportional", "i": "integral", "d": "derivative"})
 
     @classmethod
     def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
-        """By rules or by gains. Raises StageError for both or neither."""
+        """Return the form of a table: by rules or by gains. Raises StageError for both or neither."""
         by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.recognised_by)
         keys_of = {
             form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys

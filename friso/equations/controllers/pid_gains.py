@@ -1,4 +1,4 @@
-"""PID by its gains (thesis, Eq. 6), with feedforward of what the move is believed to need."""
+"""PID by its gains (thesis, Eq. 6), with feedforward for acceleration, viscous and Coulomb friction."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedf
 
 
 SLOWER = 4.0
-"""Integral time in units of the derivative time, of an integral to begin with."""
+"""Initial integral time, in units of the derivative time."""
 
 
 class Terms(NamedTuple):
@@ -85,7 +85,7 @@ class PidGains(Pid):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Terms:
-        """Return which terms there are."""
+        """Return which terms the controller has."""
         derived = flat[KD] > 0
         return Terms(
             integral=bool(flat[KI] > 0),
@@ -101,7 +101,7 @@ class PidGains(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return the derivative of the other signal, feedforward, and no integral."""
+        """Return other structures to try: derivative of the other signal, feedforward, no integral."""
         listed: dict[str, Mapping[str, Any]] = {}
         if flat[KD] and flat[DERIVATIVE_ON] == "error":
             listed["derivative of the measurement"] = {DERIVATIVE_ON: "measurement"}
@@ -120,7 +120,10 @@ class PidGains(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's gains and times and, if it is one, those of a P over PI loop."""
+        """Return the controller's gains and times.
+
+        Those of an equivalent P over PI loop follow, if there is one.
+        """
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]
         if ki and kp:
@@ -135,7 +138,7 @@ class PidGains(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """A sum where something acts beside the error."""
+        """Draw a summing point where a term acts besides the error."""
         derivative = "kd s/(1 + tau s)" if flat[TAU] else "kd s"
         on_error = flat[DERIVATIVE_ON] == "error"
         terms = ["kp", *(["ki/s"] if flat[KI] else []), *([derivative] if flat[KD] and on_error else [])]
@@ -146,7 +149,7 @@ class PidGains(Pid):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the gain of the integral is not 0."""
+        """Tell whether the integral gain is not 0."""
         return bool(flat[KI] > 0)
 
     @classmethod
@@ -156,7 +159,7 @@ class PidGains(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """Return the three parts of the force [N] in Eq. 6, and the feedforward if there is any."""
+        """Return the three terms of the force [N] in Eq. 6, and the feedforward if there is any."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

@@ -1,8 +1,8 @@
-"""Controllers that are given as a transfer function of the error, in one form or another: what they have in common.
+"""Define the common base of controllers given as a transfer function of the error.
 
-The transfer function is gain k0/(s + p) + gain R(s): an integral, which winds up and may leak at a rate p, beside
-sections of the second order. One for samples is turned by the bilinear transform (Tustin), which a drive with these
-samples turns back exactly.
+The transfer function is split into gain k0/(s + p) + gain R(s). The first term is an integral, which may leak at a rate
+p; R(s) is a product of second-order sections. A transfer function in z is converted by the bilinear transform (Tustin).
+A drive with the same sample time converts it back exactly.
 """
 
 from __future__ import annotations
@@ -27,10 +27,13 @@ if TYPE_CHECKING:
 
 SAMPLE_TIME, DRIVE_TIME, LOOP_TIME = f"{CONTROLLER}.sample_time", "drive.sample_time", "drive.position_sample_time"
 PARTS = "parts"
-"""Under which the coefficients of integral and sections stand among the flat keys of a stage."""
+"""Prefix of the flat keys that hold the coefficients of integral and sections."""
 
 AT_ZERO = 1e3 * ROUNDING
-"""Share of the largest pole (or of 1, in z) up to which a pole is one at 0 (at z = 1), moved by rounding."""
+"""Largest distance from 0 (in z: from 1) at which a pole counts as an integrator, relative to the largest pole (in z:
+to 1).
+
+Rounding moves poles by less."""
 
 
 class TransferRoots(NamedTuple):
@@ -63,7 +66,7 @@ def _divides(flat: Mapping[str, Any]) -> Any:
 
 
 class RationalController(ControllerSection):
-    """Base of the controllers that are transfer functions: a kind says how its roots are given."""
+    """Base of controllers that are transfer functions; a subclass says how its roots are given."""
 
     gain: Annotated[float, Number(positive, "1.0")] = 1.0
     """By what the force is multiplied."""
@@ -97,9 +100,9 @@ class RationalController(ControllerSection):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys with coefficients of integral and sections, and a drive's samples.
+        """Return the flat keys with coefficients of the integral and the sections.
 
-        The sample time is added if the file has none for the drive.
+        The controller's sample time becomes the drive's, if the file gives none for the drive.
         """
         roots, times = cls.roots(flat), flat.get(SAMPLE_TIME)
         if times is None or not np.ndim(times):
@@ -109,7 +112,7 @@ class RationalController(ControllerSection):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> RationalTerms:
-        """Return which terms there are."""
+        """Return which terms the transfer function has."""
         orders = (number for number in range(1, len(flat)) if cls.key(f"{PARTS}.{number}.b1") not in flat)
         sections = next(orders) - 1
         odd = sections > 0 and cls.key(f"{PARTS}.{sections}.a2") not in flat
@@ -118,12 +121,12 @@ class RationalController(ControllerSection):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a slow one like it."""
+        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a slow one close to it."""
         return cls.key(f"{PARTS}.integral") in flat
 
     @classmethod
     def note(cls, flat: Mapping[str, Any]) -> str:
-        """Say that a verdict is on the continuous equivalent of a controller for samples."""
+        """Say that a verdict applies to the continuous equivalent of a sampled controller."""
         if SAMPLE_TIME not in flat:
             return ""
         equivalent = "The verdict is on the continuous equivalent (Tustin) of the controller"
@@ -131,18 +134,18 @@ class RationalController(ControllerSection):
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: RationalTerms) -> sp.Expr:
-        """Return the static stiffness beside the integral [N/m]."""
+        """Return the static stiffness in parallel with the integral [N/m]."""
         return blocks.key("gain") * blocks.key(f"{PARTS}.stiffness")
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """A box with the order."""
+        """Draw a box with the order of the transfer function."""
         order = cls.variant(flat).order + cls.integrates(flat)
         canvas.box(f"C({'z' if SAMPLE_TIME in flat else 's'}), order {order}")
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: RationalTerms) -> Mapping[str, Signal]:
-        """Return the shares of the integral and of the sections [N]."""
+        """Return the terms of the integral and of the sections [N]."""
         gain, speed = blocks.key("gain"), blocks.key("speed")
         rule = "bilinear" if variant.sampled else None
         with blocks.loop("position"):
@@ -166,10 +169,10 @@ class RationalController(ControllerSection):
 
 
 def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of timing that follow from the controller's own sample time.
+    """Return the timing keys that follow from the controller's own sample time.
 
-    They are the drive's sample time if the file has none, or the period of a controller that runs less often than the
-    drive.
+    They set the drive's sample time if the file has none, else the period of a controller that runs more slowly than
+    the drive.
     """
     if SAMPLE_TIME not in flat:
         return {}
@@ -216,10 +219,10 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
 
 
 def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Split a transfer function with one slow pole into that pole's part and the rest.
+    """Split off the part of a transfer function that belongs to its one slow pole.
 
-    Where prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of poles is k0/(s + leak) + R(s), returns k0, R(0) and
-    the times t of the zeros of R.
+    The whole is prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of poles, equal to k0/(s + leak) + R(s). Returns
+    k0, R(0) and the times t of the zeros of R.
     """
     upper, lower = _expanded(zeros), _expanded(poles)
     at_the_pole = [np.polyval(part[::-1], -leak) for part in (upper, lower)]
@@ -271,7 +274,10 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 
 
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
-    """Return coefficients of s and s^2 of second-order factors; an odd one out has no s^2."""
+    """Return the coefficients of s and s^2 of second-order factors.
+
+    With an odd number of times, the last factor is of first order and has None for s^2.
+    """
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)
     factors: list[tuple[float, float | None]] = [(2 * t.real, abs(t) ** 2) for t in pairs]
@@ -284,7 +290,7 @@ def _wrong(actual: str, expected: str) -> InputError:
 
 
 def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
-    """Make the error of a pole that is not stable, in s or in z."""
+    """Return the error for an unstable pole, in s or in z."""
     if sample_time is None:
         worst = poles[np.argmax(np.real(poles))]
         expected = "poles left of 0, and one at 0 for an integral; a transfer function in z needs its sample_time"
@@ -295,7 +301,7 @@ def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
 
 
 def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
-    """Return the roots of a quotient of polynomials given by highest powers first.
+    """Return the roots of a quotient of polynomials, each given from the highest power down.
 
     Raises InputError.
     """

@@ -16,7 +16,7 @@ from friso.stage.lists import Coefficients, Rows, Values, element_keys, row_keys
 from friso.stage.section import OneTable, TableArray, UncertainSection
 
 WAYS = ("denominator", "poles", "sections")
-"""Keys that each belong to one way of giving a transfer function."""
+"""Keys of which each selects one way to give a transfer function."""
 
 
 class TransferSection(UncertainSection):
@@ -60,7 +60,7 @@ class TransferFunction(RationalController):
 
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
-        """Return zeros, poles and gain, whichever way they are given. Raises InputError."""
+        """Return zeros, poles and gain, whichever way the file gives them. Raises InputError."""
         if _ways(flat) != 1:
             actual = "none of them" if not _ways(flat) else "several of them"
             expected = "one of numerator and denominator, zeros and poles, or [[controller.sections]]"
@@ -84,6 +84,6 @@ def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
 
 
 def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """Return roots, with the conjugates of complex ones."""
+    """Return the roots under a key; the conjugates of complex roots are added."""
     roots = [complex(flat[name]) for name in element_keys(flat, key)]
     return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])

@@ -63,7 +63,7 @@ class VanDijk(Pid):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> str | None:
-        """Return "derivative" if the low-pass acts on that alone, else None."""
+        """Return "derivative" if the low-pass acts on the derivative alone, else None."""
         return "derivative" if flat.get(LOW_PASS) == "derivative" else None
 
     @classmethod
@@ -73,7 +73,7 @@ class VanDijk(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return the other structure to try: the same gains, with the derivative of the measurement."""
+        """Return the other structure to try: equal gains, with the derivative of the measurement."""
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
@@ -91,7 +91,7 @@ class VanDijk(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """The low-pass, then the three terms; or these, their derivative filtered."""
+        """Draw the low-pass followed by the three terms, or the three terms with a filtered derivative."""
         if cls.variant(flat):
             canvas.box("k_p (1 + tau_z/tau_i + 1/(tau_i s) + tau_z s/(1 + tau_p s))")
             return
@@ -100,7 +100,7 @@ class VanDijk(Pid):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Always."""
+        """Return True: the controller always has an integral."""
         return True
 
     @classmethod
@@ -110,7 +110,7 @@ class VanDijk(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: str | None) -> Mapping[str, Signal]:
-        """Return the three shares [N] of Eq. 7, or with the filter of Eq. 6."""
+        """Return the three terms of the force [N]: those of Eq. 7, or those with the filter of Eq. 6."""
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         if variant:
             return {
@@ -127,7 +127,7 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return a [controller] table for a crossover such as "8 Hz", alpha and beta as in examples."""
+    """Return a [controller] table for a crossover such as "8 Hz", with the alpha and beta of the examples."""
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 
@@ -137,7 +137,7 @@ def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
 
 
 def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
+    """Return gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
     from sympy import S
 
     from friso.equations.continuous import Continuous
@@ -157,7 +157,7 @@ def as_gains(k_p: float, tau_z: float, tau_i: float, tau_p: float) -> dict[str, 
 
 
 def rules(blocks: Blocks) -> dict[str, sp.Expr]:
-    """Eq. 8: gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s]."""
+    """Return gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] by Eq. 8."""
     from sympy import pi, sqrt
 
     crossover, alpha, beta, mass = map(blocks.key, ("crossover", "alpha", "beta", "tuned_mass"))

@@ -1,4 +1,4 @@
-"""Friction laws, one file each; every module in this folder is imported, and registers the law it declares."""
+"""Friction laws, one file each; importing this package registers the laws of all its modules."""
 
 from importlib import import_module
 from pkgutil import iter_modules

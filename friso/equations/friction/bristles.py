@@ -1,4 +1,7 @@
-"""What laws with one damped bristle share: how it gives way is each law's own, the rest is that of LuGre."""
+"""Define what friction laws with one damped bristle have in common.
+
+The rate of the bristle differs from law to law; the rest is as in LuGre.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ def bristle_friction(
     """Return friction of a bristle that deflects at `rate` [m/s]: F = s0 z + s1 z' + s2 v.
 
     s0, s1, s2 are stiffness, damping and viscous friction. The first of the `kinks` is the reversal of the velocity.
-    `sliding` holds states and modes in steady sliding, if they do not follow from the equations.
+    `sliding` holds states and modes in steady sliding, where the equations do not determine them.
     """
     from friso.equations.component import Component, Output, Role, State, key, state
 
@@ -42,9 +45,9 @@ def bristle_friction(
 
 
 def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
-    """Return keys of a law whose bristle is as stiff and damped as measured.
+    """Return keys of a law whose bristle has the measured stiffness and damping.
 
-    `shape` are keys of the shape of its virgin curve, which are added.
+    The keys in `shape` are added; they shape the virgin curve.
     """
     return {
         **measured.levels.keys,
@@ -55,9 +58,9 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 
 
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
-    """Return the condition of passivity that damped bristles do not meet; "" if they do.
+    """Return the violated condition of passivity of a damped bristle; "" if the law is passive.
 
-    The most bent bristles give way `softer` times as fast as in LuGre; `power` writes that in the condition.
+    A fully bent bristle yields `softer` times as fast as in LuGre. `power` writes that factor in the condition.
     """
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer

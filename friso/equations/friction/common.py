@@ -1,4 +1,4 @@
-"""What several friction laws share: their keys, and the steady friction level of Eq. 4."""
+"""Define what several friction laws have in common: their keys, and the steady friction level of Eq. 4."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ STEADY_LOAD = Rule(
 
 
 LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "viscous": "Viscous friction"}
-"""Names of these keys on the axes of maps."""
+"""Names of the friction keys on the axes of maps."""
 
 
 class Friction:
@@ -66,8 +66,8 @@ class Friction:
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
 
-        The side of the direction is left out. Raises ValueError if the law does not declare them and its rates are not
-        linear in its states.
+        The side of the direction is left out. Raises ValueError if the law does not declare its sliding state and its
+        rates are not linear in its states.
         """
         import sympy as sp
 
@@ -85,7 +85,7 @@ class Friction:
         return slid | modes | sides | stated
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
-        """Return the force [N] in a steady motion at the velocity; None where it cannot be said."""
+        """Return the force [N] in steady motion at the velocity; None where the law does not determine it."""
         from friso.equations.cases import Piecewise
 
         try:
@@ -118,9 +118,9 @@ def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) ->
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
-    """Return the kink at which the velocity [m/s] changes its direction, which all laws share.
+    """Return the kink at which the velocity [m/s] changes its direction, which all laws have.
 
-    Beyond it the velocity is positive. Friction may have a peak about it that is `narrow` [m/s].
+    `beyond` is 1 for a positive velocity. Friction may have a peak of width `narrow` [m/s] around the kink.
     """
     from friso.equations.component import Kink
 
@@ -137,10 +137,11 @@ def _is_direction(kink: Kink) -> bool:
 
 
 class StribeckCurve(NamedTuple):
-    """Choices on which the equations of a Stribeck curve depend.
+    """Choices that decide the equations of a Stribeck curve.
 
-    The exponent is given if it is a small whole number, and then written out as products; else it is None. The others
-    say whether friction, and viscous friction, differ between directions, and whether conditions multiply the levels.
+    `exponent` is given if it is a small whole number, and its powers are then written as products; otherwise it is
+    None. The other fields tell whether levels and viscous friction differ between directions, and whether [conditions]
+    multiply the levels.
     """
 
     exponent: int | None
@@ -219,11 +220,11 @@ def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Exp
 
 
 TINY = 1e-60
-"""Keeps roots and powers of squares differentiable at 0."""
+"""Small number that keeps roots and powers of squares differentiable at 0."""
 
 
 def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return the viscous share [N], smooth in v while the sign is held."""
+    """Return the viscous force [N], smooth in v while the sign is held."""
     from friso.equations.component import key
 
     force = key("friction.viscous") * velocity

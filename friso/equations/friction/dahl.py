@@ -32,12 +32,12 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Tell whether there are conditions that multiply the level."""
+        """Tell whether [conditions] multiply the level."""
         return has_conditions(flat)
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: bool) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import Component, Output, Role, State, key, state
 
         forward = direction(velocity)
@@ -53,7 +53,7 @@ class Dahl(FrictionSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """Return measured quantities of Dahl's law: one level at all speeds.
 
-        It has no Stribeck velocity, and no damping at rest but the viscous.
+        It has no Stribeck velocity, and only viscous damping at rest.
         """
         coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
         levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
@@ -64,7 +64,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return the stiffness, and friction at speed: break-away is lost."""
+        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost."""
         return {
             "friction.coulomb": measured.levels.coulomb,
             "friction.viscous": measured.levels.viscous,
@@ -73,9 +73,9 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return all that there is."""
+        """Return the law's keys; Dahl's law has no free shape."""
         return Dahl.keeping(measured, 1)
 
 
 NO_SPEED = 1e-3
-"""Stribeck velocity [m/s] of a law whose friction does not depend on speed: any will do."""
+"""Stribeck velocity [m/s] given to a law whose friction does not depend on speed; its value is arbitrary."""

@@ -60,7 +60,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import Kink, key, sine, state
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
@@ -88,7 +88,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Purely elastic up to the break-away deflection."""
+        """Return measured quantities of a law that is purely elastic up to its break-away deflection."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
         force = virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement)
@@ -96,14 +96,14 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return bristles as measured, with the break-away deflection that fits best."""
+        """Return keys with measured bristles and the break-away deflection that fits best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Bristles that slip from a share of Coulomb friction on."""
+        """Return keys with bristles that slip from a fraction of Coulomb friction onwards."""
         begins = shape["elastic_share"] * _most(measured)
         return keeping_bristle(measured, breakaway_deflection=begins)
 
@@ -114,21 +114,24 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Passive where LuGre with the same bristles is: alpha is from 0 to 1."""
+        """Return the violated condition of passivity.
+
+        The law is passive if LuGre with equal bristles is, because alpha lies between 0 and 1.
+        """
         return bristles_active(flat)
 
 
 def _most(measured: MeasuredFriction) -> float:
-    """Return the break-away deflection [m] at which bristles hold Coulomb friction.
+    """Return the deflection [m] at which the bristles carry Coulomb friction in the weaker direction.
 
-    The weaker direction counts.
+    Larger break-away deflections are not possible.
     """
     levels = measured.levels
     return levels.coulomb * (1 - abs(levels.asymmetry)) / measured.stiffness
 
 
 def _break_away_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
-    """Break-away deflections [m], and how far the virgin curve is off with each."""
+    """Return trial break-away deflections [m], and the misfit of the virgin curve for each."""
     levels, stiffness = measured.levels, measured.stiffness
     tried = np.linspace(0.02, 0.98, 49) * _most(measured)
     curves = (virgin_force(levels.static, stiffness, begins, measured.displacement) for begins in tried)

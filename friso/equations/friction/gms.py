@@ -42,17 +42,17 @@ if TYPE_CHECKING:
 STIFFNESS, SHARE, DAMPING = (f"friction.element_{name}" for name in ("stiffness", "share", "damping"))
 
 AT = 1 - 1e-9
-"""Share of the limit from which on an element that is pulled further is taken to slip at the start of a run."""
+"""Fraction of its limit from which a pulled element counts as slipping at the start of a run."""
 
 MOST = 12
-"""Elements at most."""
+"""Largest number of elements."""
 
 FITTED, EVEN = 4, 1.5
-"""Elements that are fitted to a record, and how closely their tangents lie towards the end of the virgin curve."""
+"""Number of elements fitted to a record, and the exponent that spaces their tangents on the virgin curve."""
 
 
 class Elements(NamedTuple):
-    """What the equations depend on: Stribeck curve, number of elements, and damping."""
+    """Choices that decide the equations: Stribeck curve, number of elements, and their damping."""
 
     curve: StribeckCurve
     number: int
@@ -110,14 +110,14 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return what the code depends on: the curve, the number of elements, and their damping."""
+        """Return the choices that decide the equations: curve, number of elements, and their damping."""
         return Elements(
             StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
         )
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: Elements) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from sympy import And, Integer, sqrt
 
         from friso.equations.cases import Piecewise
@@ -158,7 +158,10 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """From rest each element is drawn along until it bears its share of static friction."""
+        """Return measured quantities of the law.
+
+        From rest, each element is stretched until it carries its fraction of static friction.
+        """
         levels, stiffness, strength = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         strength = strength * levels.static
         displacement = virgin_displacements(levels.static, float(stiffness.sum()), strength / stiffness)
@@ -185,10 +188,10 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return `FITTED` elements on the virgin curve of rolling friction, at even slopes.
+        """Return `FITTED` elements on the virgin curve of rolling friction, at evenly spaced slopes.
 
-        All but the first are stiffer by a factor in `shape`, and friction lags a further factor longer than in LuGre
-        at the Stribeck velocity.
+        `shape` has two factors. One multiplies the stiffness of all elements but the first. The other lengthens the lag
+        of friction relative to that of LuGre at the Stribeck velocity.
         """
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)
@@ -204,16 +207,16 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Return how far friction lags behind a changing speed: a decade to either side."""
+        """Return the range of the attraction, which no virgin curve determines: a factor of ten up and down."""
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity that is not met: static equal to Coulomb friction.
+        """Return the violated condition of passivity: static friction must equal Coulomb friction.
 
-        Otherwise a slip that slows down loads the elements without a displacement, and they give that energy back when
-        they are unloaded.
+        Otherwise slip that slows down loads the elements without a displacement, and they return that energy when they
+        are unloaded.
         """
         levels, stiffness, share = levels_under_conditions(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         gained = float((share**2 * (levels.static**2 - levels.coulomb**2) / (2 * stiffness)).sum())
@@ -235,22 +238,22 @@ def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.
 
 
 def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """Return the values of a list, shape (elements,)."""
+    """Return the values of a list key, shape (elements,)."""
     return np.array([flat[name] for name in element_keys(flat, key)])
 
 
 SAME = 1e-6
-"""Difference of slopes, as a share of the first, below which a virgin curve is straight there."""
+"""Difference of slopes, relative to the first, below which a virgin curve counts as straight."""
 
 POWERS = np.linspace(0.6, 4.0, 69)
-"""How closely the tangents may lie towards the end of the virgin curve."""
+"""Exponents to try for spacing the tangents along the virgin curve."""
 
 
 def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return stiffness [N/m] and slip deflection [m] of elements with the virgin curve.
+    """Return stiffness [N/m] and slip deflection [m] of elements that approximate the virgin curve.
 
-    Both have the shape (at most `elements`,). They give the curve itself if it is straight between so many points,
-    otherwise the polygon of tangents with the least error.
+    Both have the shape (at most `elements`,). A curve of few straight pieces is reproduced exactly. Otherwise the
+    elements form the polygon of tangents with the least error.
     """
     slopes = np.append(np.diff(measured.force) / np.diff(measured.displacement), 0.0)
     corners = np.flatnonzero(-np.diff(slopes) > SAME * measured.stiffness)
@@ -264,7 +267,7 @@ def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.n
 def _tangents(measured: MeasuredFriction, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the elements of the polygon of tangents whose slopes are `levels`.
 
-    They are in units of the first stiffness, from 1 to 0.
+    Slopes are relative to the first stiffness, from 1 down to 0.
     """
     slope = measured.stiffness * levels
     touched = np.interp(-slope, -measured.slope, measured.displacement)

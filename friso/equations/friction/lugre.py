@@ -34,7 +34,7 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import key, state
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
@@ -45,19 +45,19 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """From rest F = F_s (1 - exp(-sigma_0 x/F_s))."""
+        """Return measured quantities of the law; from rest, F = F_s (1 - exp(-sigma_0 x/F_s))."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
         return on_bristles(flat, displacement, -static * np.expm1(-displacement * stiffness / static))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Bristles as stiff and damped as measured; the shape of the virgin curve is LuGre's own."""
+        """Return keys with the measured stiffness and damping; the virgin curve keeps the shape of LuGre."""
         return keeping_bristle(measured)
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return all that there is."""
+        """Return the law's keys; LuGre has no free shape."""
         return keeping_bristle(measured)
 
     @staticmethod

@@ -1,5 +1,8 @@
-"""What measurements show of friction, whatever the law: steady friction over speed, the force over displacement before
-sliding from rest (the virgin curve), and damping at rest. Laws declare theirs, and what else they leave open."""
+"""What measurements show of friction, whatever the law.
+
+They show steady friction over speed, the force over displacement from rest until sliding (the virgin curve), and
+damping at rest. Each law declares these quantities, and which of its parameters they do not determine.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,13 @@ import numpy as np
 from friso.equations.conditions import LEVELS, level_under_conditions
 
 REACH, POINTS, FURTHER = 60.0, 2000, 200
-"""How far virgin curves go, in units of the deflection that static friction would cause at the first stiffness; and
-their points, which lie the closer the nearer to rest, and in those that go on further."""
+"""Length of virgin curves, and numbers of their points.
+
+The length is in units of the deflection that static friction causes at the first stiffness. Points are denser near
+rest. The last number is that of points on a longer curve."""
 
 NEAR = 1e-6
-"""Distance of points, as a share of the last, below which no slope can be told."""
+"""Distance between points, relative to the last, below which no slope is computed."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class Levels:
 
     @property
     def keys(self) -> dict[str, float]:
-        """As keys of the stage file; asymmetries only where there are any."""
+        """Return the levels as keys of the stage file, with asymmetries only where they are not 0."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {f"friction.{name}": value for name, value in values.items() if value or "asymmetry" not in name}
 
@@ -61,9 +66,9 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """Return the largest deviation of another virgin curve [N], as a share of static friction.
+        """Return the largest deviation from another virgin curve [N], as a fraction of static friction.
 
-        Both have the same displacements.
+        Both curves have the same displacements.
         """
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
@@ -95,20 +100,19 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """Return what measurements would show of a law with a Stribeck curve and bristles.
+    """Return the measured quantities of a law with a Stribeck curve and bristles.
 
-    The bristles are as stiff and damped as those of LuGre, and give the virgin curve `force` [N] over `displacement`
-    [m].
+    Stiffness and damping are as in LuGre, and the virgin curve is `force` [N] over `displacement` [m].
     """
     stiffness, damping = (float(flat[f"friction.bristle_{name}"]) for name in ("stiffness", "damping"))
     return MeasuredFriction(levels_of(flat), stiffness, damping, displacement, force)
 
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
-    """Return a virgin curve whose slope falls by a power of the missing force (Dahl's exponent).
+    """Return a virgin curve whose slope falls with a power of the force that is still missing.
 
-    It is force [N] over displacement [m] from rest, both of shape (n,). Below an exponent of 1 it ends at static
-    friction, at 0 it is straight.
+    The power is Dahl's exponent. The result is the force [N] over displacement [m] from rest, both of shape (n,). With
+    an exponent below 1 the curve ends at static friction; with 0 it is straight.
     """
     way, more = stiffness * displacement / static, exponent - 1
     lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
@@ -121,10 +125,10 @@ def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
 
 
 SLACK = 0.02
-"""Share of static friction by which a virgin curve may be off more than the best, and still pass for the measured."""
+"""Misfit by which a virgin curve may exceed the best and still pass, as a fraction of static friction."""
 
 
 def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
-    """Return the range of the candidates that a measurement could not tell from the best."""
+    """Return the range of candidates that a measurement cannot distinguish from the best."""
     good = candidates[misfits <= np.min(misfits) + SLACK]
     return float(good.min()), float(good.max())

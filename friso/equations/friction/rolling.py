@@ -1,10 +1,10 @@
-"""Rolling friction whose stiffness before gross rolling falls as a power of the force: Dahl 1976, doi:10.2514/3.61511,
-in the frame of LuGre (a Stribeck level, bristle damping and viscous friction).
+"""Rolling friction whose stiffness before gross rolling falls with a power of the force.
 
-Dahl's exponent i shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i, so that from rest
-1 - F/F_s = (1 + (i - 1) sigma_0 x/F_s)^(-1/(i - 1)). With i = 1 this is LuGre. The memory is that of one state:
-Masing's rule, which ball guideways obey (Al-Bender, Symens 2005, doi:10.1016/j.wear.2004.11.018), holds for elements
-side by side (`gms`), not here: behind a reversal from rolling the stiffness is 2^i sigma_0.
+It is due to Dahl 1976, doi:10.2514/3.61511, here with the Stribeck level, bristle damping and viscous friction of
+LuGre. Dahl's exponent i shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i. From rest, 1 - F/F_s =
+(1 + (i - 1) sigma_0 x/F_s)^(-1/(i - 1)); with i = 1 the law is LuGre. It has a single state, so that a reversal from
+rolling leaves the stiffness 2^i sigma_0. Masing's rule, which ball guideways obey (Al-Bender, Symens 2005,
+doi:10.1016/j.wear.2004.11.018), needs elements in parallel (`gms`).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import key, state
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
@@ -73,7 +73,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return friction against displacement from rest on a virgin curve, by Dahl's exponent."""
+        """Return measured quantities of the law; Dahl's exponent shapes the virgin curve."""
         static, stiffness, i = (
             flat[f"friction.{name}"] for name in ("static", "bristle_stiffness", "rolling_exponent")
         )
@@ -83,19 +83,19 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Bristles as stiff and damped as measured; the exponent fits the virgin curve best."""
+        """Return keys with measured bristles and the exponent that fits the virgin curve best."""
         return keeping_bristle(measured, rolling_exponent=best(*_exponent_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"rolling_exponent": (1.0, 1.5, 4.0)}
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Bristles with the exponent."""
+        """Return keys with bristles of the given exponent."""
         return keeping_bristle(measured, rolling_exponent=shape["rolling_exponent"])
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Exponents with which the virgin curve is hardly another."""
+        """Return the range of exponents with almost the same virgin curve."""
         return {"friction.rolling_exponent": as_good(*_exponent_candidates(measured))}
 
     @staticmethod
@@ -110,10 +110,10 @@ class Rolling(StribeckSection):
 
 
 LACKS = 0.01
-"""Share of static friction that a virgin curve may lack at the end of what is shown of it."""
+"""Force that a virgin curve may lack at its last point, as a fraction of static friction."""
 
 ROUNDED = 1e-4
-"""Share of the level that bristles lack below which they give way in proportion to it."""
+"""Missing force, as a fraction of the level, below which the bristle yields in proportion to it."""
 
 
 def softening(lacking: Any, exponent: Any) -> Any:
@@ -127,7 +127,7 @@ def softening(lacking: Any, exponent: Any) -> Any:
 
 
 def _exponent_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
-    """Exponents, and how far the virgin curve is off with each."""
+    """Return trial exponents, and the misfit of the virgin curve for each."""
     tried = np.linspace(1.0, 4.0, 301)
     curves = (power_law(measured.levels.static, measured.stiffness, i, measured.displacement) for i in tried)
     return tried, np.array([measured.misfit(curve) for curve in curves])

@@ -35,7 +35,7 @@ class Stribeck(StribeckSection):
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
-        """Friction on a body moving at `velocity` [m/s]."""
+        """Return the equations of friction on a body moving at `velocity` [m/s]."""
         from sympy import tanh
 
         from friso.equations.component import Component, key
@@ -51,12 +51,12 @@ class Stribeck(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Friction over speed alone: before sliding there is none."""
+        """Return measured quantities of the law: friction over speed, and none before sliding."""
         return MeasuredFriction(levels_of(flat), 0.0, 0.0, np.zeros(1), np.zeros(1))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Friction over speed, down to a hundredth of the Stribeck velocity."""
+        """Return keys with friction over speed, down to a hundredth of the Stribeck velocity."""
         return {
             **measured.levels.keys,
             "friction.regularisation_velocity": SLOWEST * measured.levels.stribeck_velocity,
@@ -64,4 +64,4 @@ class Stribeck(StribeckSection):
 
 
 SLOWEST = 0.01
-"""Share of the Stribeck velocity at which the curve rises from 0."""
+"""Velocity scale at which the curve rises from 0, as a fraction of the Stribeck velocity."""

@@ -1,4 +1,4 @@
-"""Motions, one file each; every module in this folder is imported, and registers the motion it declares."""
+"""Motions, one file each; importing this package registers the motions of all its modules."""
 
 from importlib import import_module
 from pkgutil import iter_modules

@@ -29,7 +29,7 @@ from friso.stage.section import Rule
 from friso.stage.tables import ROUNDING
 
 LIMITS = {"velocity": "m/s", "acceleration": "m/s^2", "jerk": "m/s^3", "snap": "m/s^4"}
-"""Limits of a move, each of which bounds one derivative more, and their units."""
+"""Limits of a move, from velocity to its highest derivative, and their units."""
 
 DISTANCE, DWELL = "motion.distance", "motion.dwell"
 
@@ -118,7 +118,7 @@ def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
 
 
 def _later(derivatives: Sequence[Any], time: Any) -> list[Any]:
-    """Return the derivatives of a polynomial a time [s] later."""
+    """Return the derivatives of a polynomial at a later time [s]."""
     later: list[Any] = []
     for k in range(len(derivatives)):
         total = derivatives[-1]
@@ -147,7 +147,7 @@ def _moves(flat: Mapping[str, Any]) -> list[tuple[Plan, Any, Any]]:
 
 
 def _end(flat: Mapping[str, Any]) -> Any:
-    """Return when the last move has ended [s]."""
+    """Return the time [s] at which the last move ends."""
     move, start, _ = _moves(flat)[-1]
     return start + move.time
 
@@ -195,12 +195,12 @@ class MoveProfile(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return polynomials of as high a degree as there are limits."""
+        """Return the form of the reference: polynomials whose degree is the number of limits."""
         return ReferenceForm(len(_limits(flat)))
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the pieces of all moves; the last one stands."""
+        """Return the pieces of all moves; during the last piece the reference stands."""
         return [piece for move, start, position in _moves(flat) for piece in corners(move, start, position)]
 
     @staticmethod
@@ -218,7 +218,7 @@ class MoveProfile(Motion):
 
     @staticmethod
     def lowered(flat: Mapping[str, Any]) -> Sequence[Lowered]:
-        """Return the peaks that moves are too short to reach."""
+        """Return the limits that short moves do not reach, with the peaks that they reach instead."""
         return [
             Lowered(float(move.distance), name, float(flat[f"motion.{name}"]), float(peak), unit)
             for move, _, _ in _moves(flat)
@@ -228,7 +228,7 @@ class MoveProfile(Motion):
 
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the duration of all moves with their dwells."""
+        """Return the default duration: the time of all moves with their dwells."""
         return {} if DURATION in flat else {DURATION: _end(flat) + flat[DWELL]}
 
     @staticmethod
@@ -238,6 +238,6 @@ class MoveProfile(Motion):
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of acceleration and velocity."""
+        """Return the ranges in which acceleration and velocity are varied."""
         keys = ("motion.acceleration", "motion.velocity")
         return {key: (shares[0] * flat[key], shares[1] * flat[key]) for key in keys}

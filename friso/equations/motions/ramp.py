@@ -24,10 +24,10 @@ class Ramp(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the one piece, at constant velocity from place 0."""
+        """Return the one piece of the reference: constant velocity, from position 0."""
         return [(0.0, 0.0, flat[VELOCITY], 0.0)]
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return how far the reference goes [m]."""
+        """Return the distance that the reference travels [m]."""
         return np.abs(flat[VELOCITY] * flat[DURATION])

@@ -22,7 +22,7 @@ class Release(Motion):
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return how far the masses are displaced [m]."""
+        """Return the initial displacement of the masses [m]."""
         return np.abs(flat[DISPLACEMENT])
 
     @staticmethod
@@ -32,5 +32,5 @@ class Release(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the displacement of a longer one."""
+        """Return the displacement of a motion that is longer by a factor."""
         return {DISPLACEMENT: flat[DISPLACEMENT] * factor} if np.any(flat[DISPLACEMENT]) else {}

@@ -9,7 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class MotionSettings(Settings):
-    """How many moves and sinusoids there may be, and how finely reversals of sums of sinusoids are sought."""
+    """Limits on the numbers of moves and sinusoids, and the resolution of the search for reversals."""
 
     most_moves: int = setting(100, "")
     """Moves of a profile: each has eight pieces or more, and settling is told for each."""

@@ -22,7 +22,7 @@ class Step(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the place at which the reference stands from the start."""
+        """Return the one piece of the reference: it stands at the end of the step from the start."""
         return [(0.0, flat[SIZE], 0.0, 0.0)]
 
     @staticmethod
@@ -32,5 +32,5 @@ class Step(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the size of a longer one."""
+        """Return the step of a motion that is longer by a factor."""
         return {SIZE: flat[SIZE] * factor} if np.any(flat[SIZE]) else {}

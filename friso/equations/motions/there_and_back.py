@@ -18,7 +18,7 @@ ACCELERATION, TIME, RETURN, CRUISE = (
 
 
 def _time_there(flat: Mapping[str, Any]) -> Any:
-    """Return the time of the move there [s]."""
+    """Return the time that the outward move takes [s]."""
     return (2 + flat.get(CRUISE, 0.0)) * flat[TIME]
 
 
@@ -83,7 +83,7 @@ class ThereAndBack(Motion):
 
     @classmethod
     def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
-        """Return both ends of the motion."""
+        """Return both ends of the motion, where the reference stops."""
         rows = cls.pieces(flat)
         return [Stand(rows[len(rows) // 2 - 1][0], flat[RETURN]), Stand(rows[-1][0], flat[DURATION])]
 
@@ -94,7 +94,7 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of acceleration and its time in which the move ends before it returns."""
+        """Return ranges of acceleration and acceleration time; the outward move ends before the return begins."""
         least, most = shares
         acceleration, time = flat[ACCELERATION], flat[TIME]
         if not acceleration * time:

@@ -33,21 +33,21 @@ FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
 
 
 TURN, WITHIN = np.pi / 2, 16
-"""Angle [rad] by which the loop may turn from one frequency to the next, at how many places between two it is looked
-at, and how often the grid is halved for it at most."""
+"""Largest turn [rad] of the loop between neighbouring frequencies, places examined in between, and most halvings of the
+grid."""
 
 
 @dataclass(frozen=True)
 class Balance:
-    """Outcome of a single-harmonic balance.
+    """Result of a single-harmonic balance.
 
-    `amplitudes` [m] and `frequencies` [Hz] are the solutions, with the `residuals` left there, all of shape
-    (solutions,). There are none if there is no cycle. `least` is the smallest residual of the grid, at the amplitude
+    `amplitudes` [m] and `frequencies` [Hz] are the solutions, with the remaining `residuals`, all of shape
+    (solutions,); empty without a cycle. `least` is the smallest residual of the grid, at the amplitude
     `least_amplitude` [m] of the cart and `least_frequency` [Hz]. A residual is abs(N - 1/R) over abs(N) + abs(1/R): 0
-    where the balance holds, and at most 1.
+    for a solution, and at most 1.
 
-    The grid holds no other cycle, except possibly in two kinds of cell. At a corner of `unknown` cells, friction was
-    not found. Around `unsolved` cells the balance turns, but no solution was found in them.
+    The grid has no other cycle, except possibly in two kinds of cell: friction was not found at a corner of `unknown`
+    cells, and in `unsolved` cells the balance turns around zero without a solution found.
     """
 
     amplitudes: np.ndarray
@@ -105,7 +105,7 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
-    """Tell whether places (2, count) lie in their cells (count, 2), or in one next to them."""
+    """Tell whether places (2, count) lie in or next to their cells (count, 2)."""
     near = np.ones(len(cells), bool)
     for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
@@ -115,13 +115,13 @@ def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.
 
 @dataclass(frozen=True)
 class _Loop:
-    """The two sides of the balance, at logarithms of amplitude and frequency (2, count)."""
+    """Both sides of the balance, at logarithms of amplitude and frequency (2, count)."""
 
     stage: Stage
     rtol: float
 
     def left(self, logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """N - 1/R [N/m], complex, and the residual, both of shape (count,)."""
+        """Return N - 1/R [N/m], complex, and the residual, both of shape (count,)."""
         amplitudes, frequencies = np.exp(logs)
         flat = self.stage.flat()
         stiffness = dynamic_stiffness(flat, amplitudes, frequencies, self.rtol)
@@ -143,7 +143,7 @@ class _Loop:
         return frequencies
 
     def polished(self, logs: np.ndarray) -> np.ndarray:
-        """Solutions by Newton's method from near them, which stays where it has no step."""
+        """Return solutions by Newton's method from nearby starts, which stay where no step exists."""
         settings = FrequencySettings.current()
         for _ in range(settings.balance_newton_steps if logs.size else 0):
             sides = [

@@ -1,8 +1,7 @@
-"""Solve for the motion of a plant with friction under a sinusoidal force:
-all amplitudes that a force may give.
+"""Solve for the motion of a plant with friction under a sinusoidal force: all amplitudes that a force may cause.
 
-The masses, joint and parasitic mode are linear; friction acts on the cart through its describing function N(A, omega).
-A force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c. So its amplitude A is a root of A
+Masses, joint and parasitic mode are linear; friction acts on the cart through its describing function N(A, omega). A
+force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c. So its amplitude A is a root of A
 abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction.
 """
 
@@ -21,7 +20,7 @@ from friso.frequency.parts import mechanics
 from friso.frequency.settings import FrequencySettings
 
 LIMITS = (1e-18, 1e18)
-"""Amplitudes [m] beyond which nothing is looked for."""
+"""Smallest and largest amplitude [m] of the search."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class DrivenPlant:
         """Return amplitudes [m] that need less and more than each force at each frequency.
 
         Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
-        and do not depend on which other forces are asked for.
+        and do not depend on other forces.
         """
         settings = FrequencySettings.current()
         rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
@@ -91,10 +90,7 @@ class DrivenPlant:
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
-        """Return amplitudes moved until their forces lie below or above those asked for.
-
-        Side -1 moves them down, side 1 up.
-        """
+        """Return amplitudes moved until their forces lie below (side -1) or above (side 1) the given ones."""
         settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
@@ -111,7 +107,7 @@ class DrivenPlant:
         """Return amplitudes [m] with their forces [N] on a grid, both (frequencies, points).
 
         The third result, shape (forces, frequencies, points - 1), marks the cells in which a root for a force is
-        sought.
+        searched.
         """
         settings = FrequencySettings.current()
         low, high = self.ends(forces)
@@ -129,11 +125,11 @@ class DrivenPlant:
 
 @dataclass(frozen=True)
 class Roots:
-    """Amplitudes [m] of the cart at which a force and a frequency are balanced, shape (count,).
+    """Amplitudes [m] of the cart in equilibrium with a force at a frequency, shape (count,).
 
-    `force` and `frequency` are their indices. Also whether the force rises with the amplitude, and the relative error
-    left. `unknown`, of shape (forces, frequencies), tells whether friction was not found at some amplitude at which a
-    root may be.
+    `force` and `frequency` are indices. Further arrays tell whether the force rises with the amplitude, and the
+    remaining relative error. `unknown`, of shape (forces, frequencies), tells whether friction was not found at an
+    amplitude at which a root may be.
     """
 
     force: np.ndarray
@@ -145,7 +141,7 @@ class Roots:
 
 
 def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
-    """Return all amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
+    """Return all amplitudes at which forces [N] move the cart, within the resolution of the grid."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])
@@ -162,10 +158,9 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 
 
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Return zeros of many functions between ends with values of opposite sign.
+    """Return zeros of many functions between ends with values of opposite sign, and the remaining values.
 
-    Also returns what is left there. The method takes the secant of the bracket and halves the value of an end that
-    stays (Illinois).
+    The method takes the secant of the bracket and halves the value of an end that stays (Illinois).
     """
     settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)

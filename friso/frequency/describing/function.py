@@ -68,7 +68,7 @@ def describing(
     of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
     harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
     itself; the others come from `samples` samples of the period, whose accuracy `aliasing` estimates: by how much the
-    first harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled,
+    first harmonic from the samples differs from the integrated one, as a fraction of it (NaN if nothing was sampled,
     which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
     Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics, samples or an `rtol` that
@@ -112,7 +112,7 @@ def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> 
 def _variables(
     amplitudes: np.ndarray, force: np.ndarray, rest: Mapping[str, np.ndarray]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
-    """Dimensions, values (pairs, ...) and attributes of the variables."""
+    """Return dimensions, values (pairs, ...) and attributes of the variables."""
     plane = ("amplitude", "frequency")
     stiffness = force[:, 1] / amplitudes
     named = {
@@ -130,7 +130,7 @@ def _variables(
 
 
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
-    """Positive numbers as an array. Raises InputError."""
+    """Return positive numbers as an array. Raises InputError."""
     array = np.atleast_1d(np.asarray(values, dtype=float))
     if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0)):
         raise InputError(name, str(values), "positive numbers in one row", example)
@@ -158,7 +158,7 @@ def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int
 
 
 def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: int) -> np.ndarray:
-    """Harmonics of the force [N] from states (runs, samples of the share of a period, states)."""
+    """Return harmonics of the force [N] from states (runs, samples of a part of the period, states)."""
     within = round(samples * share)
     force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T
     period = force if share == 1.0 else np.hstack([force, -force])

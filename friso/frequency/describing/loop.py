@@ -1,4 +1,4 @@
-"""A closed loop as friction sees it: by how much cart and stage move for a friction force on the cart."""
+"""Compute the closed loop as friction sees it: positions of cart and stage per friction force on the cart."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.nda
 
 @cache
 def _loop(form: Structure) -> Declared:
-    """Return the stage's own equations with a force in the place of friction."""
+    """Return the stage's own equations with a force in place of friction."""
     control = replace(form.controller, anti_windup=None) if form.controller else None
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)

@@ -1,4 +1,4 @@
-"""The mass line of a plant with friction, as measured at several places of the rail (thesis, Fig. 17)."""
+"""Compute the mass line of a plant with friction, measured at several places of the rail (thesis, Fig. 17)."""
 
 from __future__ import annotations
 

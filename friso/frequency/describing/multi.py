@@ -1,9 +1,9 @@
-"""Multi-harmonic balance of a loop with friction: a periodic motion as a Fourier series, found by Newton's method.
+"""Find a periodic motion of a loop with friction as a Fourier series, by multi-harmonic balance and Newton's method.
 
 Alternating frequency and time (Cameron, Griffin 1989, doi:10.1115/1.3176036): the series gives the velocity in time,
-that the friction force (`waveform`), and its harmonics have to move the loop by the series. The mechanics and the
-controller may be any linear ones. Started from a motion that is known, such as a simulated one: the method has no way
-of its own to find a cycle, and single-harmonic balance, the usual start, may not have any (`balance`).
+the velocity the friction force (`waveform`), and its harmonics must move the loop by the series. Mechanics and
+controller may be any linear ones. The method starts from a known motion, such as a simulated one, because it cannot
+find a cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class HarmonicSeries:
     """A periodic motion by its harmonics, as found by Newton's method.
 
     `cart` and `stage` [m], complex, are harmonics at `orders` of the angular frequency [rad/s]: position = Re(sum of
-    harmonic exp(i order omega t)). `step` is the last step of the method, as a share of the known amplitude. It is a
-    motion only if `status` is "done".
+    harmonic exp(i order omega t)). `step` is the last step of the method, relative to the known amplitude. The result
+    is a motion only if `status` is "done".
     """
 
     orders: np.ndarray
@@ -44,7 +44,7 @@ class HarmonicSeries:
 
     @property
     def amplitude(self) -> float:
-        """Half of the peak-to-peak motion of the stage [m]."""
+        """Return half of the peak-to-peak motion of the stage [m]."""
         return float(np.ptp(self.over_period(self.stage)) / 2)
 
     def over_period(self, harmonics: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ class Basis:
 
     @classmethod
     def of(cls, harmonics: int, mirrored: bool, intervals: int) -> Basis:
-        """Up to the harmonic of this order, with so many intervals per period."""
+        """Make a basis up to a harmonic, with so many intervals per period."""
         orders = np.arange(1, harmonics + 1, 2) if mirrored else np.arange(harmonics + 1)
         share = 0.5 if mirrored else 1.0
         angles = 2 * np.pi * (np.arange(int(intervals * share)) + 0.5) / intervals
@@ -85,7 +85,7 @@ class Basis:
         return cls(orders, -1.0 if mirrored else 1.0, waves, slopes, share)
 
     def harmonics(self, signal: np.ndarray) -> np.ndarray:
-        """Complex harmonics (orders, columns) of signals at the middles (M, columns)."""
+        """Return complex harmonics (orders, columns) of signals at the middles of intervals (M, columns)."""
         weights = np.where(self.orders == 0, 1.0, 2.0)[:, None] / len(self.waves)
         real, imaginary = np.split(self.waves.T @ signal, 2)
         return weights * (real + 1j * imaginary)
@@ -140,7 +140,7 @@ class _Problem:
     """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
 
     Unknowns are real and imaginary parts of the harmonics over the length, and the logarithm of omega over the known
-    one; the phase is held against a shift of the known motion.
+    one; the phase is fixed relative to the known motion.
     """
 
     flat: Mapping[str, Any]
@@ -172,12 +172,12 @@ class _Problem:
 
     @property
     def _phase(self) -> np.ndarray:
-        """Direction in which a shift in time moves the known motion."""
+        """Return the direction in which a time shift moves the known motion."""
         real, imaginary = np.split(self.start, 2)
         return np.concatenate([-imaginary * self.basis.orders, real * self.basis.orders])
 
     def jacobian(self, state: np.ndarray) -> np.ndarray:
-        """Derivative of the residual by the state."""
+        """Return the derivative of the residual by the state."""
         _, speed = self.split(state)
         answer, nudge = self.answer(state), 1e-6
         stretched = self.basis.slopes @ state[:-1]
@@ -209,12 +209,12 @@ class _Problem:
         return state, size
 
     def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
-        """Return the share of a step that leads closer."""
+        """Return the fraction of a step that leads closer to the solution."""
         settings = FrequencySettings.current()
         shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
 
 
 def _parts(values: np.ndarray) -> np.ndarray:
-    """Real parts and, behind them, imaginary parts."""
+    """Return real parts followed by imaginary parts."""
     return np.concatenate([np.real(values), np.imag(values)])

@@ -1,9 +1,8 @@
-"""Compute the frequency response of a plant with friction as a drive's analyser measures it,
-for a given force.
+"""Compute the frequency response of a plant with friction as a drive's analyser measures it, for a given force.
 
 The analyser divides the first harmonic of the position by the force (Gelb, Vander Velde 1968, quasi-linear response).
-One force may have several answers. Those at which the force falls with the amplitude are unstable. Which of the others
-shows depends on where the analyser comes from.
+One force may have several responses. Those at which the force falls with the amplitude are unstable; which of the
+others appears depends on the history of the analyser.
 """
 
 from __future__ import annotations
@@ -130,7 +129,7 @@ def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
     """Return the branch that an analyser shows at every frequency, (forces, frequencies).
 
-    It steps up (order 1) or down (-1). It shows the stable branch nearest in amplitude to the one before; at the
+    It steps up (order 1) or down (-1), and shows the stable branch nearest in amplitude to the previous one; at the
     start, the smallest.
     """
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
@@ -146,7 +145,7 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Return the problem with the answers to every force at every frequency, or "done"."""
+    """Return the problem with the responses to every force at every frequency, or "done"."""
     settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)

@@ -1,9 +1,9 @@
-"""Friction under an imposed sinusoidal motion: the periodic steady state of its internal states, found in lanes.
+"""Find the periodic steady state of friction under an imposed sinusoidal motion, in lanes.
 
-An internal state forgets where it came from at the rate at which the motion wears it off: at amplitudes far below the
-deflection at break-away that takes thousands of periods, and plain settling is hopeless. The map of the internal
-states over a period is solved for its fixed point instead, by secants; LuGre's and Dahl's states obey linear equations
-under an imposed motion, so that their map is affine and the first secant is exact.
+An internal state forgets its start at the rate at which the motion wears it off: at amplitudes far below the deflection
+at break-away that takes thousands of periods. So the map of the internal states over a period is solved for its fixed
+point, by secants; LuGre's and Dahl's states obey linear equations under an imposed motion, so that their map is affine
+and the first secant is exact.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ class Imposition:
 
     @cached_property
     def inner(self) -> list[int]:
-        """Places of the law's own states."""
+        """Return the indices of the law's own states."""
         return self.kernel.having(Role.BRISTLE)
 
     @cached_property
     def scales(self) -> np.ndarray:
-        """Magnitudes of the states, shape (count, states)."""
+        """Return the magnitudes of the states, shape (count, states)."""
         return _rows(self.kernel.module.scales(self.values), self.count).T
 
     @cached_property
@@ -73,7 +73,7 @@ class Imposition:
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
-        """Friction force and rates of the law's own states, from states (states, count)."""
+        """Return the friction force and the rates of the law's own states, from states (states, count)."""
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         rates = module.right_hand_side(states, modes, 0.0, at_rest, self.values)
@@ -92,10 +92,7 @@ class Imposition:
         return Imposition(flat, len(numbers), self.rtol)
 
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
-        """Follow a share of a period from the law's own states (count, inner).
-
-        There are `samples` per period.
-        """
+        """Follow a part of a period from the law's own states (count, inner), with `samples` per period."""
         settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
         starts[:, self.kernel.position] = self.flat["motion.displacement"]
@@ -112,7 +109,7 @@ def _rows(rows: list[Any], count: int) -> np.ndarray:
 
 
 def periodic_gap(rtol: float) -> float:
-    """Gap up to which a state counts as periodic."""
+    """Return the gap up to which a state counts as periodic."""
     settings = FrequencySettings.current()
     return min(settings.gap_tolerances * rtol, settings.widest_gap)
 
@@ -121,8 +118,8 @@ def periodic_gap(rtol: float) -> float:
 class PeriodicStates:
     """Periodic steady states of a friction law.
 
-    They are the law's own states at the farthest point of the motion (count, inner), and the `gap` left after a period
-    as a share of their scales, shape (count,). The last array says which runs were completed, shape (count,).
+    They are the law's own states at the farthest point of the motion (count, inner), the remaining `gap` after a period
+    relative to their scales, shape (count,), and which runs were completed, shape (count,).
     """
 
     inner: np.ndarray
@@ -131,7 +128,7 @@ class PeriodicStates:
 
 
 def steady(friction: Imposition) -> PeriodicStates:
-    """Return the periodic steady states; half a period does where the law is symmetric."""
+    """Return the periodic steady states; half a period suffices for a symmetric law."""
     settings = FrequencySettings.current()
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
@@ -151,7 +148,7 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """Return which part of a period must be followed, and the sign of the states after it."""
+    """Return the part of a period that must be followed, and the sign of the states after it."""
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 

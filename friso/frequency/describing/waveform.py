@@ -93,7 +93,7 @@ class FrictionAnswer:
     pushed: np.ndarray
 
     def along(self, velocities: np.ndarray) -> np.ndarray:
-        """Changes of the force [N] for changes of the velocities [m/s], both of shape (M, columns)."""
+        """Return changes of the force [N] for changes of the velocities [m/s], both of shape (M, columns)."""
         direct = self.by_velocity[:, None] * velocities
         if self.chain is None:
             return direct
@@ -102,7 +102,7 @@ class FrictionAnswer:
 
 @dataclass(frozen=True)
 class Chain:
-    """States z_0 to z_M of which after[k] z_(k+1) - before[k] z_k is given, and z_M = sign z_0."""
+    """States z_0 to z_M with given after[k] z_(k+1) - before[k] z_k, and z_M = sign z_0."""
 
     after: np.ndarray
     before: np.ndarray

@@ -22,17 +22,17 @@ from friso.hunting.loop import surely_run_away
 from friso.hunting.rows import ArrayRows
 
 BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
-"""Starts of the second try, as multiples of the distance at which an observed motion sticks."""
+"""Start distances of the second try, as multiples of the distance at which an observed motion sticks."""
 
 
 @dataclass(frozen=True)
 class Target(ArrayRows):
-    """The motions that stages end in unless they come to rest: arrays (count,) or numbers.
+    """Limit cycles in which stages end unless they come to rest: arrays (count,) or numbers.
 
-    Each motion swings by at least `amplitude` [m], half of peak to peak, with a period of at most `period` [s]. It
-    does so once the time `lasting` [s] has passed. A motion that swings this far after the time `early` [s] will also
-    do so later. Where attractors were only `observed`, not closed as orbits, other attractors nearby may swing as far
-    but less often.
+    A motion that swings by at least `amplitude` [m], half of peak to peak, with a period of at most `period` [s], after
+    the time `lasting` [s] has reached its limit cycle. A motion that swings this far after the time `early` [s] will
+    also do so later. Where attractors were only `observed` in simulations, others nearby may swing as far but less
+    often.
     """
 
     amplitude: Any
@@ -72,7 +72,7 @@ class Attractors:
 
     @property
     def target(self) -> Target:
-        """Return the motions that stages end in, shape (count,); NaN without an attractor."""
+        """Return the limit cycles in which stages end, shape (count,); NaN for a stage without one."""
         settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
@@ -157,7 +157,7 @@ def attractors(
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
-    """Confirm suggested stable cycles by runs, and start more runs beside unstable ones."""
+    """Confirm suggested stable cycles by runs, and add runs that start beside unstable cycles."""
     for cycles in suggested:
         survey.note_unstable_cycles(numbers, cycles)
         starts.beside(cycles)
@@ -190,10 +190,7 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
-    """Survey stages without a closed orbit again, at a tighter tolerance.
-
-    The second survey holds where the two disagree.
-    """
+    """Survey stages without a closed orbit again at a tighter tolerance, whose result counts where both disagree."""
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:

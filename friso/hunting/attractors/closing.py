@@ -53,7 +53,8 @@ def close_orbits(
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
     """Return which closed orbits, shape (count,), pass through a simpler orbit several times.
 
-    After `fewer` swings such an orbit is back where the stage sticks, or at its mirror image if the number is odd.
+    After `fewer` swings such an orbit is back at the state in which the stage sticks, or at its mirror image if `fewer`
+    is odd.
     """
     if not stages.count:
         return np.zeros(0, bool)
@@ -75,10 +76,10 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """Return a state of each run, (runs, states), while it sticks within the next times [s].
+    """Return a state of each run, (runs, states), in which it sticks within the next `times` [s].
 
-    It is the instant at which the integrator balances the constant forces on a stage at rest. If there are several,
-    the one after the longest standstill counts. Times have the shape (runs,).
+    At this instant the integrator balances the constant forces on a stage at rest. If there are several such instants,
+    the one after the longest standstill is taken. `times` has the shape (runs,).
     """
     settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
@@ -94,10 +95,9 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """Return the sample at which the integrator is balanced after the longest standstill.
+    """Return the sample (with a fraction) at which the integrator is balanced after the longest standstill.
 
-    The sample has a fraction. `residuals` are the imbalance of the integrator, `place` [m] the position that sticks,
-    both of shape (samples,).
+    `residuals` are the imbalance of the integrator, `place` [m] the sticking position, both of shape (samples,).
     """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed

@@ -14,9 +14,9 @@ from friso.hunting.rows import ArrayRows
 class Recurrence(ArrayRows):
     """Repetition of runs, arrays of shape (runs,).
 
-    `swings` is the smallest number of swings after which a run repeats itself (0: it does not), and `time` [s] the time
-    they take. `better` is the number after which it repeats best, and `better_time` [s] the time of these. `size` [m]
-    is peak to peak. `deviation` is the error of the best repetition as a share of it, and `earlier` that error some
+    `swings` is the smallest number of swings after which a run repeats (0: it does not repeat) and `time` [s] their
+    duration. `better` and `better_time` [s] belong to the most accurate repetition. `size` [m] is the peak-to-peak
+    deviation. `deviation` is the error of the most accurate repetition over `size`, and `earlier` that error some
     swings before. `mean` [m] is the mean size of single swings.
     """
 
@@ -73,5 +73,5 @@ def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
 
 
 def _compared(swings: int) -> int:
-    """Return how many swings must match those before them for a repetition."""
+    """Return how many swings are compared with earlier ones to detect a repetition."""
     return max(swings, 4)

@@ -22,16 +22,16 @@ from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().survey_rtol
 TIGHT = ToleranceSettings().tight_survey_rtol
-"""Relative tolerances of these runs: the usual one, and a tighter one where simulations alone decide."""
+"""Relative tolerances of survey runs: the usual one, and a tighter one where only simulations decide."""
 
 
 @dataclass(frozen=True)
 class Pending(ArrayRows):
-    """Runs on their way, one for each stage of the ensemble `stages`.
+    """Unfinished runs, one for each stage of the ensemble `stages`.
 
     `states` (runs, kept) are the present states and `durations` [s] the lengths of the next round. `loose` [m] is the
-    distance from which a stage breaks away. `mirrored` says that mirror images are motions too. Each has the shape
-    (runs,) unless stated; `rtol` is the relative tolerance.
+    distance from which a stage breaks away. `mirrored` marks stages whose mirror-image motions are motions too. Arrays
+    have the shape (runs,) unless stated; `rtol` is the relative tolerance.
     """
 
     stages: Ensemble
@@ -44,11 +44,11 @@ class Pending(ArrayRows):
 
 @dataclass(frozen=True)
 class Ends(ArrayRows):
-    """End of a round of runs, arrays of shape (runs,).
+    """Results of a round of runs, arrays of shape (runs,).
 
-    `states`, (runs, kept), are the final states. Runs were `completed`, ran `away` from their reference, or surely
-    `rest`; `steps` counts solver steps. `repeats` says how the last swings repeat; `values` [m] and `times` [s] are
-    their turning points, (runs, swings).
+    `states`, (runs, kept), are the final states. A run is `completed`, runs `away` from its reference, or certainly
+    comes to `rest`; `steps` counts solver steps. `repeats` describes how the last swings repeat; `values` [m] and
+    `times` [s] are the turning points, (runs, swings).
     """
 
     states: np.ndarray
@@ -62,16 +62,13 @@ class Ends(ArrayRows):
 
     @property
     def swing(self) -> np.ndarray:
-        """Return which runs swing, shape (runs,), whether they already repeat themselves or not."""
+        """Return which runs swing at the end of the round, shape (runs,), periodically or not."""
         settings = SurveySettings.current()
         return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= settings.least_turns)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
-    """Estimate the period of a hunting cycle [s], shape (count,).
-
-    It follows from the wait while sticking and the loop's frequency.
-    """
+    """Estimate the period of a hunting cycle [s], shape (count,), from the sticking time and the loop's frequency."""
     settings = SurveySettings.current()
     return 2 * (wait(stages, settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
 
@@ -138,10 +135,10 @@ def _stands_still(
 
 
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
-    """Give runs a longer next round.
+    """Lengthen the next round of runs.
 
-    A run that does not `swing`, (runs,), gets a round long enough to show that it rests or swings slowly. The round
-    stays short enough that a run which begins to swing does not swing through most of it.
+    A run that does not `swing`, (runs,), gets a round long enough to show that it rests or swings slowly, but short
+    enough that a run which starts to swing does not swing through most of the round.
     """
     settings = SurveySettings.current()
     least = np.where(

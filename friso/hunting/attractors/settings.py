@@ -1,4 +1,4 @@
-"""Settings of the survey of what attracts stages, by simulations from many starts."""
+"""Settings of the search for limit cycles of stages by simulation from many starts."""
 
 from __future__ import annotations
 
@@ -9,187 +9,198 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class SurveySettings(Settings):
-    """Settings of the survey: runs from many starts, followed in rounds to their attractors."""
+    """Settings of the survey, which follows runs from many starts, in rounds, to their attractors."""
 
     arrival_periods: tuple[float, float] = setting((60.0, 600.0), "periods")
     """Shortest and longest time until a motion counts as arrived. If shorter, slow transients pass for attracted; if
     longer, runs cost more and change nothing."""
 
     arrival_time_constants: float = setting(8.0, "time constants")
-    """Near a flip transients last: after eight time constants 0.03 % of a deviation is left."""
+    """Waiting time near a stable cycle, in its own time constants. After eight of them 0.03 % of a deviation is left.
+    """
 
     early_arrival_share: float = setting(0.25, "")
-    """Two time constants, or 15 periods: most motions have come by then, and the rest need not be run."""
+    """Time of an early check, as a fraction of the arrival time. Most motions have arrived by then and need not be run
+    on."""
 
     longest_counted_period: float = setting(3.0, "typical periods")
-    """Arrival times count in periods of at most this; slower cycles would make every motion be followed for as long."""
+    """Longest period used for arrival times. A slower cycle would make every motion be followed for as long."""
 
     closed_orbit_periods: float = setting(6.0, "periods")
-    """Shortest wait for a motion near a closed orbit, however slow the orbit."""
+    """Shortest wait for a motion near a closed orbit, however fast the orbit attracts."""
 
     observed_swing_periods: float = setting(24.0, "periods")
-    """Longer wait for a swing that was only observed: its time constant is unknown."""
+    """Shortest wait for a swing that was only observed, whose time constant is unknown."""
 
     samples_per_repetition: int = setting(400, "")
-    """Fewer miss where a stage stands still between swings; more take longer."""
+    """Samples of one repetition when a sticking instant is looked for. Fewer miss short standstills; more take longer.
+    """
 
     still_move_share: float = setting(1e-3, "of peak to peak")
-    """A stage that moves farther from sample to sample does not stick there."""
+    """Largest move between samples of a stage that sticks. If larger, slow sliding passes for sticking."""
 
     repeated_orbit_share: float = setting(1e-3, "")
-    """Orbits that pass through a simpler one several times differ by less; others by more."""
+    """Largest relative difference between an orbit and a simpler one that it passes through several times."""
 
     closed_swing_share: float = setting(0.2, "of peak to peak")
-    """An orbit whose size differs by more is not the one that the run came to."""
+    """Largest relative difference in size between a closed orbit and the run from which it was started."""
 
     most_repeating_swings: int = setting(12, "swings")
-    """Motions that repeat after more swings look irregular, and cost more to detect."""
+    """Longest repetition looked for. Motions that repeat after more swings count as irregular; detecting them costs
+    more."""
 
     repeated_swing_share: float = setting(0.03, "of the largest swing")
-    """Small swings scatter by half of it; larger differences are no repetition."""
+    """Largest difference between swings that repeat. If larger, irregular motion passes for periodic."""
 
     compared_swings: int = setting(16, "swings")
-    """With fewer, a motion that approaches a cycle slowly looks as if it had arrived."""
+    """Number of swings compared to detect a repetition. With fewer, a slow approach to a cycle looks periodic."""
 
     closer_repetition_share: float = setting(0.2, "")
-    """A repetition after more swings replaces the shorter one only if its error is smaller by this factor."""
+    """Factor by which a longer repetition must reduce the error to replace a shorter one."""
 
     first_round_periods: float = setting(24.0, "typical periods")
-    """If shorter, slow stages show no swing yet; if longer, work is wasted on stages that rest."""
+    """Length of the first round. If shorter, slow stages show no swing yet; if longer, stages at rest waste work."""
 
     next_round_factor: float = setting(3.0, "")
-    """Slow transients take many rounds if it is smaller, and the last round wastes work if it is larger."""
+    """Length of a round over that of the previous one. If smaller, slow transients take many rounds; if larger, the
+    last one wastes work."""
 
     typical_distance: float = setting(0.3, "deflections at break-away")
-    """The swing from this distance sets the typical period, the unit of all durations."""
+    """Start distance of the swing that defines the typical period, the unit of all durations."""
 
     quiet_round_factor: float = setting(10.0, "")
-    """A run that has not swung may wait long for its first swing; longer rounds waste work."""
+    """Length of the next round over the last one, for a run that has not swung yet."""
 
     kept_swings: int = setting(32, "swings")
-    """Enough to see repetitions of several swings; more take memory in every run."""
+    """Last swings that are stored of each run. Fewer hide repetitions after several swings; more take memory."""
 
     turning_point_room: int = setting(1 << 20, "")
-    """All runs of a round together: more would take too much memory."""
+    """Turning points stored for all runs of a round together, limited by memory."""
 
     run_turning_points: int = setting(1 << 14, "")
-    """Runs that need more are run again with more room; larger arrays slow down every run."""
+    """Turning points stored for a run at first. Runs that need more are repeated; a larger store slows down every run.
+    """
 
     round_step_limit: int = setting(4_000_000, "steps")
-    """A run that chatters would hold up all others; normal rounds take far fewer."""
+    """Steps after which a run of a round is stopped. A run that chatters would hold up all others."""
 
     swing_leg_share: float = setting(0.25, "of peak to peak")
-    """Smaller legs are ringing after landing, not swings."""
+    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing after landing."""
 
     least_turns: int = setting(3, "")
-    """With fewer turns in the second half of a round, a stage creeps home."""
+    """Fewest turning points in the second half of a round of a stage that swings. With fewer it creeps."""
 
     least_swing: float = setting(0.0004, "deflections at break-away")
-    """Smaller swings are below the resolution of runs; a larger limit would miss small cycles."""
+    """Smallest swing that counts. Smaller ones are below the resolution of runs; a larger limit would miss small
+    cycles."""
 
     creep_distances: tuple[float, float, int] = setting((0.001, 1.0, 16), "deflections at break-away")
-    """First, last, number of starts tried for where a stage breaks away."""
+    """First and last distance, and number of starts, of the test for where a stage breaks away."""
 
     least_overshoot_share: float = setting(0.05, "of the distance")
-    """A stage that breaks away and swings across by less creeps home."""
+    """Smallest overshoot of a stage that breaks away. A stage with less creeps to its reference."""
 
     rest_waits: float = setting(4.0, "waits")
-    """By then the integrator has passed twice from limit to limit: a stage that stood still rests."""
+    """Standstill after which a stage certainly rests, because the integrator has passed twice from limit to limit."""
 
     longest_waits: float = setting(24.0, "longest waits")
-    """A swing nearly as slow as this repeats within half of it; longer runs only cost time."""
+    """Longest round, in the longest sticking time. A slower swing repeats within half of it; longer runs only cost
+    time."""
 
     wound_up_starts: tuple[tuple[float, float, int], tuple[float, ...]] = setting(
         ((0.1, 100.0, 24), (0.0, 1.0, 10.0)), ""
     )
-    """Starts without anti-windup: first, last, number of distances [deflections by the force limit]; windups."""
+    """Starts without anti-windup: first, last and number of distances, and windups of the integrator."""
 
     farthest_start: float = setting(1e5, "deflections at break-away")
-    """A tenth of the deviation at which a run counts as diverged; farther off it would count at once."""
+    """Farthest start. It is a tenth of the deviation at which a run counts as diverged."""
 
     outer_integral_windups: tuple[float, ...] = setting((-10.0, -1.0, 1.0, 10.0), "loop times")
-    """Both signs, small and large; more multiply the starts of cascades."""
+    """Initial windups of the outer integral of a cascade, of both signs. More multiply the starts."""
 
     bending_travels: tuple[float, float] = setting((1e-3, 10.0), "deflections at break-away")
-    """From within presliding to far beyond it, by which bristles are bent."""
+    """Shortest and longest travel by which bristles are bent before a start, from presliding to far beyond it."""
 
     least_bend_back_share: float = setting(1e-3, "of the travel")
-    """Bending back by less leaves the bristles as they were."""
+    """Smallest reversal after bending the bristles. A smaller one leaves them as they were."""
 
     start_strides: tuple[int, ...] = setting((64, 16, 4, 1), "")
-    """Every 64th start runs first: most stages are decided by a few starts, so that the rest need not run."""
+    """Strides through the starts of many stages. Every 64th start runs first, because a few starts decide most stages.
+    """
 
     beside_cycle_shares: tuple[float, ...] = setting((-0.03, -0.003, 0.003, 0.03), "of the distance")
-    """Starts on both sides of an unstable cycle show the attractors next to it."""
+    """Offsets of starts from an unstable cycle, on both sides, that lead to the attractors next to it."""
 
     most_rounds: int = setting(5, "")
-    """The last round takes two thousand typical periods; a further one would use up a stage's steps."""
+    """Most rounds of a run. The last one takes two thousand typical periods."""
 
     thorough_step_limit: int = setting(16_000_000, "steps")
-    """Steps for all runs of a stage in a survey that decides: slow transients need most of them."""
+    """Most steps for all runs of a stage in a survey that decides; slow transients need most of them."""
 
     quick_step_limit: int = setting(6_000_000, "steps")
-    """Steps for all runs of a stage in other surveys: a third of it decides most stages."""
+    """Most steps for all runs of a stage in other surveys; a third of it decides most stages."""
 
     unproved_round_steps: int = setting(400_000, "steps")
-    """One of many stages that chatters would keep all others waiting."""
+    """Most steps of a round of one of many stages, which would keep all others waiting if it chatters."""
 
     same_motion_share: float = setting(0.05, "")
-    """Times and widths of one motion differ by less from run to run; other motions by more."""
+    """Largest relative difference in time and size between runs on the same motion."""
 
     same_irregular_share: float = setting(0.01, "of peak to peak")
-    """Irregular runs of one kind differ by less over a long round."""
+    """Largest difference between irregular runs of the same kind over a long round."""
 
     same_orbit_share: float = setting(1e-3, "")
-    """Closed orbits are exact, so two that differ by more are different orbits."""
+    """Largest relative difference between two computations of the same closed orbit."""
 
     most_kinds: int = setting(32, "")
-    """A stage with more kinds of runs is left undecided; following all would take too long."""
+    """Most kinds of run followed for a stage. A stage with more is left undecided, because following all takes too
+    long."""
 
     next_round_cost: float = setting(30.0, "times the last round")
-    """Kinds of runs are dropped if the next round would cost more than that."""
+    """Largest cost of the next round of one kind of run. Kinds that cost more are dropped."""
 
     runs_per_side: int = setting(4, "")
-    """As many run together in one register; fewer would miss the side on which runs leave."""
+    """Runs followed on either side of an unstable cycle. Fewer would miss the side on which runs leave."""
 
     outer_share: float = setting(0.25, "")
-    """Runs farther from an unstable cycle than this share of the farthest leave it first, so these are followed."""
+    """Outer fraction of the runs beside an unstable cycle that is followed, because these leave it first."""
 
     most_period_multiple: int = setting(2, "")
-    """Motions beside an unstable cycle repeat after its time, or after twice that."""
+    """Longest repetition beside an unstable cycle, as a multiple of the cycle's time."""
 
     enough_rounds: int = setting(3, "")
-    """Once one attractor is certain, a thorough survey looks for others for this many rounds only."""
+    """Rounds in which a thorough survey looks for further attractors once one is certain."""
 
     settled_swing_share: float = setting(0.005, "of peak to peak")
-    """Swings that repeat this closely are near enough to an orbit for Newton's method to close it."""
+    """Largest error of a repetition from which Newton's method is started to close an orbit."""
 
     close_from_round: int = setting(3, "")
-    """From this round on, an orbit is closed from every run that is left, if possible."""
+    """Round from which an orbit is closed from every remaining run, if possible."""
 
     regular_from_round: int = setting(2, "")
-    """By this round two hundred typical periods have passed; earlier, slow transients look regular."""
+    """Round from which regular motion is trusted. Before two hundred typical periods slow transients look regular."""
 
     unchanged_swing_share: float = setting(2e-3, "")
-    """A motion whose mean swing changes by more over a round still grows or decays."""
+    """Largest change of the mean swing over a round. A motion that changes more still grows or decays."""
 
     exact_repetition_share: float = setting(1e-7, "of peak to peak")
-    """A run that repeats this exactly is on an attractor: no run comes so near an unstable cycle by chance."""
+    """Largest error of a repetition that proves an attractor: no run stays so close to an unstable cycle by chance."""
 
     converged_swing_share: float = setting(1e-4, "of peak to peak")
-    """Where attraction need not be proved, a repetition this close counts as attracted."""
+    """Largest error of a repetition that counts as converged where attraction need not be proved."""
 
     approach_share: float = setting(0.7, "")
-    """The error of a repetition must shrink by this factor over some swings, or it does not approach an orbit."""
+    """Factor by which the error of a repetition must shrink over some swings for the run to approach an orbit."""
 
     orbits_per_round: int = setting(3, "")
-    """More orbits per round rarely show more, and Newton's method takes as long as a round."""
+    """Orbits closed per round and stage. More rarely show anything, and each costs as much as a round."""
 
     leaving_time_constants: float = setting(15.0, "time constants")
-    """After 15 a deviation of rounding size has grown to that of the swing."""
+    """Time for which runs are followed near an unstable cycle. Afterwards rounding errors have grown to the size of the
+    swing."""
 
     longest_leaving_rounds: float = setting(20.0, "of the last round")
-    """Near cycles that are more weakly unstable a stage is left undecided; waiting takes too long."""
+    """Longest wait for runs to leave an unstable cycle. Near weaker ones a stage is left undecided."""
 
     steady_swing_share: float = setting(0.8, "")
-    """A decay that keeps more of its swing over the last round looks like a cycle."""
+    """Fraction of the swing that a motion must keep over the last round to count as a cycle."""

@@ -17,15 +17,16 @@ from friso.hunting.cycle.rest import bent, pushed, stuck
 from friso.stage.controllers import FORCE_LIMIT
 
 THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
-"""Distances at which a stage sticks at first, in deflections of the loop by the break-away force. From the nearest most
-runs creep home; from the farthest they do not stick."""
+"""Distances at which a stage sticks at first, in deflections of the loop by the break-away force.
+
+From the nearest ones most runs creep home; from the farthest ones they do not stick."""
 
 DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
-"""Distances for surveys of many stages at once: half as many."""
+"""Start distances for surveys of many stages: half as many as for a thorough survey."""
 
 LIMITED = np.geomspace(500.0, 30000.0, 8)
-"""Farther distances, in deflections of the loop by the break-away force, for stages with a force limit. A cycle driven
-by the limit is as large as the limit moves the masses while the integrator unwinds."""
+"""Farther start distances for stages with a force limit, in deflections of the loop by the break-away force. A cycle
+driven by the limit is as large as the limit moves the masses while the integrator unwinds."""
 
 
 PUSHES = np.geomspace(0.03, 300.0, 12)
@@ -33,12 +34,12 @@ PUSHES = np.geomspace(0.03, 300.0, 12)
 """
 
 REMEMBERED = np.geomspace(0.01, 30.0, 128), np.geomspace(0.01, 10.0, 32)
-"""Start distances of stages whose several bristles are bent in many ways, in deflections of the loop by the break-away
-force: for a thorough survey, and for others."""
+"""Start distances of stages with several bristles bent in many ways: for a thorough survey, and for others. The unit is
+the deflection of the loop by the break-away force."""
 
 
 class Starts:
-    """Runs about to begin: their states (runs, states) and the numbers of their stages (runs,)."""
+    """Runs to be started: initial states (runs, states) and stage numbers (runs,)."""
 
     def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
@@ -137,24 +138,24 @@ class Starts:
             self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
     def seen(self, owner: int, state: np.ndarray) -> None:
-        """Add runs a little farther from rest, and nearer to it, than the end of a run.
+        """Add runs slightly farther from rest, and slightly nearer, than the end of a run.
 
-        `state`, (kept,), is the final state of a run of stage `owner`. A run from the state itself could stay on a
-        cycle that is only weakly unstable.
+        `state`, (kept,), is the final state of a run of stage `owner`. A run from that state itself could stay on a
+        weakly unstable cycle.
         """
         settings = SurveySettings.current()
         states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
-        """Add runs of the stages `owners` (runs,) that begin in these states (runs, states)."""
+        """Add runs of the stages `owners` (runs,) with the initial `states` (runs, states)."""
         self.owners.append(owners)
         self.states.append(states)
 
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
-        """Yield the runs ready for their first round, with the numbers of their stages.
+        """Yield the runs ready for their first round, with their stage numbers.
 
-        All come `at_once`, or in waves: the first few runs suffice for most stages that hunt.
+        They come `at_once` or in waves, because a few runs suffice for most stages that hunt.
         """
         settings = SurveySettings.current()
         if not self.owners:
@@ -174,10 +175,7 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Prepare runs for their first round.
-
-        Its length is set, and it is noted where mirror images are motions too.
-        """
+        """Prepare runs for their first round: set its length, and mark where mirror images are motions too."""
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

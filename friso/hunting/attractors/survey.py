@@ -15,15 +15,15 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Swinging:
-    """A swing that a stage does not leave: an attractor, closed as an orbit or observed.
+    """A lasting swing of a stage, closed as an orbit or observed in a simulation.
 
     - `stage`: number of the stage; `amplitude` [m]: half of peak to peak.
     - `time` [s]: after which the motion, or its mirror image, repeats; NaN if it does not.
-    - `period` [s]: of a whole repetition; about the time of two swings if the motion does not repeat.
+    - `period` [s]: of a whole repetition, or about two swings of a motion that does not repeat.
     - `distance` [m]: at which the stage sticks; `swings`: to either side in a period.
-    - `cycles`, `number`: the closed orbit and its row; None if a simulation or a return map alone shows the motion.
-    - `seen`: final state (states,) of the run that showed it.
-    - `slope`: share of a deviation left after `time`, by the return map; NaN if unknown.
+    - `cycles`, `number`: the closed orbit and its row; None if only a simulation or a return map shows the motion.
+    - `seen`: final state (states,) of the run that showed the motion.
+    - `slope`: fraction of a deviation left after `time`, by the return map; NaN if unknown.
     """
 
     stage: int
@@ -50,18 +50,12 @@ class Swinging:
 
     @property
     def observed(self) -> bool:
-        """Tell whether only a simulation shows the motion.
-
-        Then other attractors may lie beside it, and its time constant is unknown.
-        """
+        """Tell whether only a simulation shows the motion, so that its time constant is unknown."""
         return self.cycles is None and not np.isfinite(self.slope)
 
     @property
     def time_constant(self) -> float:
-        """Return the time [s] in which a deviation from the motion shrinks by the factor e.
-
-        NaN if it is unknown.
-        """
+        """Return the time [s] in which a deviation from the motion shrinks by the factor e; NaN if unknown."""
         if self.cycles is not None:
             return float(self.cycles.time_constant[self.number])
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
@@ -73,10 +67,10 @@ _Kind = tuple[int, float, float]
 
 @dataclass(frozen=True)
 class _Beside(ArrayRows):
-    """Unstable cycles near which runs repeat themselves, arrays of shape (runs,).
+    """Unstable cycles near which runs repeat, arrays of shape (runs,).
 
-    `cycles` are the numbers of the cycles, -1 for none. `offsets` are the shares by which runs swing farther than the
-    cycle, 0 without one.
+    `cycles` are the numbers of the cycles (-1: none). `offsets` are the relative amounts by which runs swing farther
+    than the cycle (0 without one).
     """
 
     cycles: np.ndarray
@@ -89,9 +83,9 @@ class _Beside(ArrayRows):
 
     @property
     def leave_first(self) -> np.ndarray:
-        """Choose the runs to follow for all runs on their side of an unstable cycle, (runs,).
+        """Choose the outer runs beside each unstable cycle, which leave it first, (runs,).
 
-        The farthest runs leave the cycle first, so a few of the outer ones stand for the rest.
+        They stand for all runs on their side of the cycle.
         """
         settings = SurveySettings.current()
         chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
@@ -104,10 +98,7 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Return which runs repeat themselves like one of some kinds of motion, (runs,).
-
-    The runs belong to the stages `owners`.
-    """
+    """Return which runs of the stages `owners` repeat like one of the given kinds of motion, (runs,)."""
     settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
@@ -143,16 +134,16 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
 
 @dataclass
 class Survey:
-    """Results of a survey so far.
+    """State of a survey.
 
-    A `thorough` survey looks for every attractor. A survey that has to `prove` attraction closes orbits; without it, a
+    A `thorough` survey looks for every attractor. A survey that must `prove` attraction closes orbits; otherwise a
     motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
-    for which a run that diverges has not failed.
+    for which divergence is no failure.
 
-    `attracting` are the attractors so far. The following have the shape (count,). A stage is `unknown` if a run failed
-    or was given up. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
-    solver steps left for the runs of a stage. `rested` and `away` [m] are the farthest starts from which runs came to
-    rest or diverged (0: none).
+    `attracting` lists the attractors so far. Arrays have the shape (count,). A stage is `unknown` if a run failed or
+    was stopped. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
+    remaining solver steps of a stage. `rested` and `away` [m] are the farthest starts from which runs came to rest or
+    diverged (0: none).
     """
 
     unbounded: np.ndarray
@@ -192,7 +183,7 @@ class Survey:
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Return which stages diverge from the farthest starts tried, and from beyond, (count,)."""
+        """Return which stages diverge from all of the farthest starts, (count,)."""
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
@@ -203,7 +194,7 @@ class Survey:
                 self._attracting_kinds.append((motion.stage, 2 * motion.amplitude, motion.time))
 
     def note_unstable_cycles(self, numbers: np.ndarray, cycles: Cycles) -> None:
-        """Note the unstable cycles of the stages with some numbers: runs take long to leave them."""
+        """Store the unstable cycles of some stages, because runs take long to leave them."""
         settings = SurveySettings.current()
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
@@ -253,10 +244,9 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """Close orbits from runs that are ready; return the runs still swinging elsewhere.
+        """Close orbits from runs that are ready; return the numbers of the runs that still swing without an attractor.
 
-        These are numbered, and have no attractor yet. `early` restricts closing to runs that repeat themselves well
-        and resemble no unstable cycle.
+        `early` restricts closing to runs that repeat well and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
@@ -277,7 +267,7 @@ class Survey:
         return swinging[~spent]
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return, for each run, how many kinds of run of its stage may be followed further."""
+        """Return, for each run, how many kinds of run of its stage the remaining steps allow."""
         settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
         steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
@@ -287,7 +277,7 @@ class Survey:
     def _kinds(
         self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
     ) -> np.ndarray:
-        """Return one run of each kind, to be followed for all of its kind.
+        """Return one run of each kind, which is followed for all runs of its kind.
 
         Marks a stage unknown if it has more kinds of run than may be followed.
         """
@@ -306,7 +296,7 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an unstable cycle, or one that could not be closed stably."""
+        """Return which runs resemble an unstable cycle, or a cycle that could not be closed as stable."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -316,7 +306,7 @@ class Survey:
         return _like(self._attracting_kinds, owners, ends)
 
     def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
-        """Close an orbit from one run of each kind, of the runs numbered `which`."""
+        """Close an orbit from one run of each kind among the runs numbered `which`."""
         most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
@@ -333,7 +323,7 @@ class Survey:
     def _close_after(
         self, runs: Pending, owners: np.ndarray, ends: Ends, swinging: np.ndarray, swings: np.ndarray, times: np.ndarray
     ) -> None:
-        """Close orbits from the runs numbered `swinging`, after so many swings and the times [s]."""
+        """Close orbits from the runs numbered `swinging`, after `swings` swings and `times` [s]."""
         repeats = ends.repeats
         for group, cycles in close_orbits(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
             numbers = swinging[group]
@@ -344,7 +334,7 @@ class Survey:
                 kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
 
     def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Count runs that swing to the last round as attracted, unless they decay.
+        """Record runs that swing to the last round as attracted, unless they decay.
 
         A run that may still be leaving an unstable cycle is first followed for as long as that takes.
         """
@@ -363,7 +353,7 @@ class Survey:
         self._observe(owners[kinds], ends.take(kinds), before[kinds])
 
     def confirm(self, runs: Pending, owners: np.ndarray, cycles: Cycles) -> None:
-        """Add the cycles of the stages `owners`, (runs,), on which a run stays that begins there."""
+        """Add cycles of the stages `owners`, (runs,), if a run that begins on the cycle stays there."""
         settings = SurveySettings.current()
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
@@ -372,7 +362,7 @@ class Survey:
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
-        """Return which runs repeat so well, and changed so little lately, that they will stay.
+        """Return which runs repeat so well, with so little recent change, that they will continue.
 
         Runs near an unstable cycle are left out.
         """
@@ -383,8 +373,8 @@ class Survey:
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs repeat as exactly as only a motion on an attractor does.
 
-        Where nothing has to be proved, runs that clearly approach a repetition count as well. A run that resembles an
-        unstable cycle only counts if it stays beside it.
+        Where no proof is needed, runs that clearly approach a repetition count as well. A run that resembles an
+        unstable cycle counts only if it stays beside it.
         """
         settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
@@ -396,10 +386,7 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs beside an unstable cycle repeat too exactly to be leaving it.
-
-        They are on another cycle.
-        """
+        """Return which runs beside an unstable cycle repeat so exactly that they lie on another cycle."""
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
@@ -436,11 +423,11 @@ class Survey:
 def _kinds(
     owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Choose runs that stand for all: no two of a stage alike, and at most `most` of each stage.
+    """Choose runs that stand for all: no two alike, and at most `most` for each stage.
 
-    Returns their numbers, and the numbers of the runs of further kinds. `most` is one number, or one for each run. Runs
-    that do not repeat count as alike only if they are very close. A few of the runs `beside` an unstable cycle stand
-    for all on that side of it.
+    Returns the numbers of the chosen runs, and of runs of further kinds. `most` is one number, or one for each run.
+    Runs that do not repeat are alike only if they are very close. A few runs `beside` an unstable cycle stand for all
+    on that side.
     """
     settings = SurveySettings.current()
     limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))
@@ -452,7 +439,7 @@ def _kinds(
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
-        """Tell whether two runs of a stage repeat in equal times, with equal swings."""
+        """Tell whether two runs of a stage repeat after equal times with equal swings."""
         same = (
             abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
             and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]

@@ -19,13 +19,13 @@ from friso.hunting.cycle.find import RTOL, Cycles, described
 from friso.hunting.cycle.shooting import Border, Family, close_along
 
 END_OF_RANGE = "end of the range"
-"""Reason given when a branch was followed to the end of the range."""
+"""Reason for the end of a branch: it reached the end of the range."""
 
 REACHED = "it reached the end of the requested range"
-"""Reason given when a branch was followed until the condition of the walk held."""
+"""Reason for the end of a branch: the condition of the walk was met."""
 
 NO_FARTHER = "it could not be followed farther"
-"""First words of the reason given when the next cycle of a branch was not found."""
+"""First words of the reason for the end of a branch whose next cycle was not found."""
 
 
 HUNDREDTH = float(np.log(1.01))
@@ -76,12 +76,12 @@ class Branch:
 
 
 class Tracer:
-    """Follows one cycle along a line of stages, from place 0 to the `farthest`.
+    """Follow one cycle along a line of stages, from place 0 to the `farthest`.
 
     The line is a family of one. `sign` and `swings` are those of the cycle; None means the fewest swings possible.
-    Steps are `pace` times as long as for drawing a curve, at least `shortest` long, and the first has the length
-    `first`. The cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length
-    of the line over which the key changes by a hundredth.
+    Steps are `pace` times as long as for drawing a curve and at least `shortest`; the first has the length `first`. The
+    cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length of the line
+    over which the key changes by a hundredth.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle as `solve` does, but only with the nearby cycle's Jacobian, if any."""
+        """Find the cycle like `solve`, with the nearby cycle's Jacobian alone, if there is one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -204,7 +204,7 @@ class Tracer:
     def _is_mirrored(self, start: Point, point: Point) -> bool:
         """Tell whether a cycle of a symmetric stage leans to the other side than the start.
 
-        Beyond the symmetric cycle a branch of asymmetric cycles is its own mirror image.
+        Beyond the symmetric cycle a branch of asymmetric cycles continues as its own mirror image.
         """
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         leans = float(point.cycle.middle[0] * start.cycle.middle[0])
@@ -220,7 +220,7 @@ class Tracer:
         return ""
 
     def branch(self, start: Point) -> Branch:
-        """Follow the whole branch through a point, to both sides."""
+        """Follow the whole branch through a point, in both directions."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 

@@ -21,9 +21,9 @@ class Crossing(NamedTuple):
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     """Find the last zero of a cubic through values, (n,), in the direction of their trend.
 
-    The error is twice what their scatter moves the cubic or their trend, or the distance to another zero of the cubic.
-    Returns None if there are too few values, or if the cubic does not pass zero. Returns None as well if the error
-    exceeds half of the range of places.
+    The error is twice the shift of the zero by the scatter of the values, or the distance to another zero of the cubic.
+    Returns None if there are too few values, if the cubic does not pass zero, or if the error exceeds half of the range
+    of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None
@@ -54,8 +54,8 @@ class FoldBack(NamedTuple):
 def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     """Find where a cubic through places, (n,), over lengths turns back, nearest to length 0.
 
-    The error of the place is twice the scatter about the cubic. Returns None if there are too few places, or if the
-    cubic does not turn within the lengths. Returns None as well if the error exceeds half of the range of places.
+    The error of the place is twice the scatter about the cubic. Returns None if there are too few places, if the cubic
+    does not turn within the lengths, or if the error exceeds half of the range of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None

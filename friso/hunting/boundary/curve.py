@@ -24,10 +24,10 @@ from friso.hunting.cycle.find import RTOL
 
 @dataclass(frozen=True)
 class Spot:
-    """A point of a curve on which a cycle changes.
+    """Point of a curve on which a cycle changes.
 
-    `at` is its place in the box of the keys, shape (2,), `special` the point of change there. `across` is the direction
-    of the line on which it was located, shape (2,).
+    `at` is its place in the box of the keys, shape (2,), and `special` the located point. `across` is the direction of
+    the line on which it was located, shape (2,).
     """
 
     at: np.ndarray
@@ -80,10 +80,7 @@ class Expected:
 
     @classmethod
     def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
-        """Extrapolate a curve one step, by a parabola through its last three points.
-
-        With two points it is a straight line.
-        """
+        """Extrapolate a curve one step, by a parabola through its last three points, or a line through two."""
         last = spots[-3:]
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
@@ -102,10 +99,9 @@ class CurveTracer:
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, expected: Expected | None = None
     ) -> Spot | None:
-        """Find the point of the curve on a line through the box, near the line's `origin`.
+        """Find the point of the curve on a line through the box, at most `reach` from the line's `origin`.
 
-        It lies no farther than `reach` from it. The search starts from the point `near` it, or from the `expected`
-        one. Returns None if it fails.
+        The search starts from the point `near` it, or from the `expected` one. Returns None if it fails.
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
@@ -126,8 +122,8 @@ class CurveTracer:
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
         """Estimate how fast the multiplier changes along the line on which a point is expected.
 
-        Across the curve it changes as at the nearby point, along an oblique line less. Returns NaN if the line through
-        the nearby point grazes the curve.
+        The slope across the curve is that of the nearby point; along an oblique line it is smaller. Returns NaN if the
+        line through the nearby point is almost tangent to the curve.
         """
         if self.kind == "fold":
             return near.special.slope
@@ -138,7 +134,7 @@ class CurveTracer:
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
-        """Follow the whole curve through a point; None if no second point is found next to it."""
+        """Follow the whole curve through a point; return None if no second point is found next to the first."""
         settings = ContinuationSettings.current()
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (settings.second_point_distance, -settings.second_point_distance):
@@ -182,7 +178,7 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """Find the point at which the curve leaves the box; none if it is not found."""
+        """Find the point at which the curve leaves the box; the list is empty without one."""
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
@@ -196,7 +192,7 @@ class CurveTracer:
         return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
-        """Return words for a place in the box: the keys with their values and units."""
+        """Describe a place in the box: the keys with their values and units."""
         values = self.space.values(at[None])
         units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)

@@ -50,10 +50,7 @@ class Diagram:
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
     def in_doubt(self, places: np.ndarray) -> np.ndarray:
-        """Return which places, (n,), lie within the error of a special point.
-
-        There multipliers decide nothing.
-        """
+        """Return which places, (n,), lie within the error of a special point, where stability is unknown."""
         return _in_doubt(self.special, places)
 
 
@@ -80,7 +77,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
-        """Follow the branch through a cycle unless an earlier one passes it; tell whether it was."""
+        """Follow the branch through a cycle unless an earlier branch passes it; return whether it was followed."""
         start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
         if any(_passes(branch, start) for branch in branches):
             return False
@@ -110,11 +107,11 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
 def each_once(
     special: Sequence[Sequence[LocatedPoint]], hundredth: Callable[[float], float]
 ) -> tuple[tuple[LocatedPoint, ...], ...]:
-    """Merge special points that are the same within their errors, and keep the first of each.
+    """Merge special points that are equal within their errors, and keep the first of each group.
 
     Points of several branches also merge if they are close in terms of `hundredth`, the length over which the key
     changes by a hundredth. Where a limiter chatters, multipliers scatter, and cycles are followed over short,
-    overlapping ways. The error of a merged point includes the difference between the points.
+    overlapping stretches. The error of a merged point includes the difference between the points.
     """
     settings = ContinuationSettings.current()
     once: list[tuple[int, LocatedPoint]] = []

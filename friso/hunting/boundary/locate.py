@@ -23,10 +23,10 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class LocatedPoint:
-    """A point at which a branch loses or gains stability.
+    """Point at which a branch loses or gains stability.
 
-    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search,
-    and the change when the tolerance is a hundredth. With a limiter that chatters it is the reserve of `smoothed` or
+    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search, and
+    the change at a hundredth of the tolerance. With a limiter that chatters it is the error bound of `smoothed` or
     `turned`. `slope` is the change of the multiplier along the direction.
     """
 
@@ -47,7 +47,7 @@ class LocatedPoint:
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
-    """Return how far the multiplier is from its value at this kind of point, with a sign."""
+    """Return the signed difference between the multiplier and its value at this kind of point."""
     if kind == "torus":
         return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
@@ -68,10 +68,7 @@ def _complex(point: Point) -> bool:
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """Locate the special point between two neighbours on a branch, with its error.
-
-    None if it is not reached.
-    """
+    """Locate the special point between two neighbours on a branch, with its error; None if it is not reached."""
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -101,9 +98,9 @@ def towards(first: Point, second: Point) -> np.ndarray:
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
-    """Search for a special point between two neighbours; return all points on the way.
+    """Search for a special point between two neighbours; return all computed points by their place along the branch.
 
-    They stand by their place along the branch. Returns None if a cycle cannot be closed.
+    Returns None if a cycle cannot be closed.
     """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
@@ -134,10 +131,7 @@ class Unreached(Exception):
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
-    """Return the slope of the multiplier's distance along the branch, near zero.
-
-    It is taken from the two points nearest to zero.
-    """
+    """Return the slope along the branch of the multiplier's signed difference, from the two points nearest to zero."""
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
@@ -181,7 +175,7 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
     """Locate a flip or torus by a curve through the multipliers of orbits near a first guess.
 
     Where a limiter chatters, multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key
-    are used. The reserve is that of the curve, or the distance to the first guess if larger. Returns None if it is
+    are used. The error bound is that of the curve, or the distance to the first guess if larger. Returns None if it is
     unknown.
     """
     orbits = _beside(tracer, guess, ALONG, tracer.hundredth(guess.place))
@@ -191,11 +185,10 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
 
 
 def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
-    """Locate a fold by a curve through the places of orbits near a first guess.
+    """Locate a fold by a curve through the places of orbits near a first guess, along a direction.
 
-    Orbits are found along a direction. Where a limiter chatters, the multiplier belongs to a range of distances and
-    passes 1 beside the fold. The reserve is that of the curve, or the distance to the first guess if larger. Returns
-    None if it is unknown.
+    Where a limiter chatters, the multiplier belongs to a range of distances and passes 1 beside the fold. The error
+    bound is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
     """
     orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
@@ -225,11 +218,10 @@ def corrected(
     states: np.ndarray,
     slope: float = np.nan,
 ) -> LocatedPoint | None:
-    """Find the special point along a direction from an origin, by the secant method.
+    """Find the special point along a direction from an origin, at most `reach` away, by the secant method.
 
-    The space is place, log distance and log time. The point lies no farther than `reach` from the origin; None if
-    there is none. The search starts from a nearby cycle, from its approximate `states` (1, states), and from the
-    `slope` of the multiplier if that is known.
+    The space is place, log distance and log time. The search starts from a nearby cycle, its approximate `states` (1,
+    states), and the `slope` of the multiplier if known. Returns None if there is no such point.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]

@@ -20,15 +20,15 @@ from friso.hunting.boundary.settings import MeetingSettings
 from friso.hunting.boundary.space import Space
 
 MeetingKind = Literal["cross", "together", "end"]
-"""Two curves cross at a point, run together over a stretch, or the first one ends on the second."""
+"""Kind of meeting of two curves: they cross, run together over a stretch, or the first one ends on the second."""
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Meeting of two curves of a plane; the curves have equal numbers where one crosses itself.
+    """Meeting of two curves in a plane; a curve that crosses itself has its number twice.
 
     `places` in the box of the keys have the shape (1, 2), or (2, 2) for both ends of a stretch. `error` is their error
-    along each key (infinite: not refined). At the meeting either both curves are changes of the `same_cycle`, or of two
+    along each key (infinite: not refined). `same_cycle` tells whether both curves are changes of one cycle, or of two
     cycles of one stage.
     """
 
@@ -72,9 +72,9 @@ def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
 
 
 class _Nearest(NamedTuple):
-    """The point of a curve nearest to a place, `away` from it, with its cycle's size.
+    """Point of a curve nearest to a place, at the distance `away`.
 
-    `cycle` holds log amplitude and log period, shape (2,).
+    `cycle` holds log amplitude and log period of the cycle there, shape (2,).
     """
 
     away: float
@@ -94,7 +94,7 @@ def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
 def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return where on each leg of a path, (n, 2), the point nearest to a place, (2,), lies.
 
-    The results are shares of the leg from 0 to 1.
+    The results run from 0 at the start of a leg to 1 at its end.
     """
     legs = np.diff(path, axis=0)
     return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
@@ -170,9 +170,8 @@ def _refined(
 ) -> Meeting:
     """Refine a crossing from a guess between two neighbouring points of each curve.
 
-    The next guess is where straight lines through a point of either curve, in the curves' directions, cross. The first
-    guess stands if a cycle is lost on the way. It also stands where a limiter chatters, because one point then costs as
-    much as many.
+    The next guess is where the tangents of both curves cross. The first guess is returned if a cycle is lost on the
+    way, or if a limiter chatters, because one point then costs as much as many.
     """
     settings, place = MeetingSettings.current(), guess
     refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
@@ -204,7 +203,7 @@ def _refined(
 def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
     """Return a curve's direction after the step `chord` to another point.
 
-    It is unchanged if the step hardly goes along the curve.
+    It is unchanged if the step hardly follows the curve.
     """
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
     settings = MeetingSettings.current()

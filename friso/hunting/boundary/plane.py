@@ -101,8 +101,8 @@ def _sought(
 ) -> tuple[list[Curve], list[np.ndarray]]:
     """Follow the curves between neighbours of which only the first has the cycle.
 
-    Also list places where none began. `changing` are pairs of neighbours, and `allowed` the numbers of the valid
-    stages among all points (points, 2).
+    Also returns the places where no curve could be begun. `changing` are pairs of neighbours, and `allowed` the numbers
+    of the valid stages among all points (points, 2).
     """
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
@@ -150,7 +150,7 @@ def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of neighbours on the grid, the first inside and the second outside."""
+    """Return pairs of neighbours on the grid, the first inside the region and the second outside."""
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -159,7 +159,7 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
-    """Tell whether a curve passes close to the way between two neighbours."""
+    """Tell whether a curve passes close to the line between two neighbours."""
     settings = ContinuationSettings.current()
     points, mesh = curve.points, float(np.linalg.norm(end - start))
     for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):
@@ -172,7 +172,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """Follow a cycle from a stage towards a neighbour until it loses stability or folds.
 
-    Returns that point, if there is one, and whether the cycle reaches the neighbour unchanged.
+    Returns that point, or None, and whether the cycle reaches the neighbour unchanged.
     """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))

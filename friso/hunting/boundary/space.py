@@ -18,12 +18,12 @@ GENERIC = 0.4721359549995794
 """An irrational place, at which no key has a special value."""
 
 FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
-"""Function that turns arrays of values by name into flat keys of stages (SI)."""
+"""Function that turns arrays of values, by name, into flat keys of stages (SI)."""
 
 
 @dataclass(frozen=True)
 class KeyRange:
-    """Range of a key, or of a free name that others follow, from `low` to `high` [SI `unit`].
+    """Range of a key, or of a variable that keys depend on, from `low` to `high` [SI `unit`].
 
     The scale is logarithmic if `log`.
     """
@@ -49,7 +49,7 @@ class KeyRange:
     def hundredth(self, place: float) -> float:
         """Return the change of place that changes the value there by a hundredth.
 
-        If the range holds 0, it is a hundredth of the larger end.
+        If the range contains 0, it is a hundredth of the larger end.
         """
         if self.log:
             return float(np.log(1.01) / abs(np.log(self.high / self.low)))

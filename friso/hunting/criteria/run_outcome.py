@@ -35,8 +35,8 @@ BAND = 1e-5
 `friso.hunting.measures.BANDS`."""
 
 LASTING = 0.5
-"""Least share of the last half's peak-to-peak deviation that the last quarter of a lasting swing has. A swing that
-decays at a tenth of the rate at which it swings is gone by then."""
+"""Least ratio of the peak-to-peak deviation over the last quarter to that over the last half of a lasting swing. A
+swing that decays at a tenth of its frequency is gone by then."""
 
 OUTCOME_CRITERION = (
     "what the run does at its end: swings (a lasting swing), creeps (outside the band without), rests (inside)"
@@ -66,8 +66,8 @@ def lasts(
 ) -> np.ndarray:
     """Return which deviations still swing by more than twice the `band` [m].
 
-    The peak-to-peak `swing` [m] must also be at least the share `lasting` of the `earlier` one [m]. A run that is long
-    enough for any transient to die out needs no earlier swing to compare with (0).
+    The peak-to-peak `swing` [m] must also be at least `lasting` times the `earlier` one [m]. A run that is long enough
+    for any transient to decay passes 0 as `earlier`.
     """
     return (swing > 2 * np.asarray(band)) & (swing >= lasting * np.asarray(earlier))
 

@@ -39,9 +39,9 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Return two settling times [s] of runs: at places left again, and at the last place.
+    """Return two settling times [s] of runs, at places left again and at the last place.
 
-    The first is the longest at any place that the reference leaves.
+    The first is the longest over all places that the reference leaves.
     """
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))

@@ -23,19 +23,19 @@ import numpy as np
 Verdict = Literal["hunts", "bistable", "transient", "settles", "failed", "none"]
 
 VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "failed")
-"""The words, the worst first."""
+"""All verdicts, the worst first."""
 
 ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
-"""Verdicts on stages with a cycle that attracts."""
+"""Verdicts on stages with a stable limit cycle."""
 
 VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
 
 
 def verdicts(decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
-    """Return the word of `VERDICTS` for every stage; all arrays have the shape (count,).
+    """Return the verdict on every stage; all arrays have the shape (count,).
 
-    `decided`: the following is known. `attracts`: a cycle attracts the stage. `ends_in_cycle`, used where one attracts,
-    and `rests`, used where none does, describe the end of the stage's own motion.
+    `decided`: the other arguments are known. `attracts`: the stage has a stable limit cycle. `ends_in_cycle`, used
+    where it has one, and `rests`, used where it has none, describe the end of the stage's own motion.
     """
     hunting = np.where(ends_in_cycle, "hunts", "bistable")
     free = np.where(rests, "settles", "transient")

@@ -1,5 +1,4 @@
-"""Represent stages that share their equations, with their reference held at zero,
-started from any state."""
+"""Represent stages that share their equations, with the reference held at zero and any initial state."""
 
 from __future__ import annotations
 
@@ -20,18 +19,18 @@ from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.transmission import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
-"""Cached properties with one row per stage."""
+"""Cached properties of an ensemble with one row per stage."""
 
 OF_ALL = ("structure", "kernel")
-"""Cached properties that all stages share."""
+"""Cached properties of an ensemble that all its stages share."""
 
 
 @dataclass(frozen=True)
 class Ensemble:
     """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
-    `form` is their structure, where the first stage alone does not show it. `threads` bounds the threads of their runs;
-    `cancel` is a flag that stops them (see `RunOptions`).
+    `form` is the structure, given where the first stage alone does not show it. `threads` bounds the threads of runs;
+    `cancel` is a flag that stops runs (see `RunOptions`).
     """
 
     flat: Mapping[str, Any]
@@ -80,7 +79,7 @@ class Ensemble:
     def remember(self) -> bool:
         """Tell whether the stages have several bristles, of which some may stick while others slip.
 
-        Such a stage still depends on its past when it breaks away.
+        The break-away of such a stage depends on its past.
         """
         return len(self.kernel.having(Role.BRISTLE)) > 1
 
@@ -99,8 +98,8 @@ class Ensemble:
     def number(self, name: str) -> np.ndarray:
         """Return a number of every stage from the generated function `name`, shape (count,).
 
-        "rate" [1/s] is the natural frequency of mass and loop. "breakaway" [N] is the largest friction force at rest.
-        "stiffness" [N/m] is the proportional stiffness of the loop.
+        "rate" [1/s] is the natural frequency of mass and loop, "breakaway" [N] the largest friction force at rest, and
+        "stiffness" [N/m] the proportional stiffness of the loop.
         """
         (value,) = getattr(self.kernel.module, name)(self.values)
         return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
@@ -114,7 +113,7 @@ class Ensemble:
     def friction_at_rest(self) -> np.ndarray:
         """Return the friction force at rest [N], the mean of both directions, (count,).
 
-        It is the break-away force less the controller's force half a backlash off its reference, which moves nothing.
+        It is the break-away force less the controller's force at half a backlash, which moves nothing.
         """
         return self.number("breakaway") - self.number("stiffness") * self.backlash / 2
 
@@ -132,7 +131,7 @@ class Ensemble:
 
     @property
     def sticking(self) -> int:
-        """Return the index of the state that stays put while a stage sticks.
+        """Return the index of the state that stays constant while a stage sticks.
 
         It is the position of the body with friction.
         """
@@ -140,10 +139,7 @@ class Ensemble:
 
     @property
     def integral(self) -> int:
-        """Return the index of the integrator's state.
-
-        With several integrators it is the innermost, which holds the force.
-        """
+        """Return the index of the integrator's state, the innermost one of several, which holds the force."""
         return self.kernel.having(Role.INTEGRAL)[-1]
 
     @property
@@ -152,13 +148,13 @@ class Ensemble:
         return self.kernel.having(Role.INTEGRAL)[:-1]
 
     def settled(self, steady: Steady) -> np.ndarray:
-        """Return the states in a steady motion that has lasted, shape (count, states)."""
+        """Return the states in a steady motion that has lasted long enough for transients to decay, (count, states)."""
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages at rest that are displaced [m].
+        """Return the states of stages at rest with a displacement [m].
 
-        Filters have followed, everything else is zero.
+        Filters have followed the displacement; everything else is zero.
         """
         return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
@@ -166,7 +162,7 @@ class Ensemble:
     def relaxed(self) -> np.ndarray:
         """Return the integrator state per displacement [s] that relaxes the actuator, (count,).
 
-        Its force is then as at the reference.
+        The actuator then exerts the force that it exerts at the reference.
         """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
@@ -174,17 +170,17 @@ class Ensemble:
     def balancing(self) -> np.ndarray:
         """Return the actuator force [N] about which a stage sticks, shape (count,).
 
-        It is zero if friction alone holds the constant forces; otherwise it balances them.
+        It is zero if friction alone holds the constant forces; otherwise it balances these forces.
         """
         constant = sum(np.asarray(self.flat[f"bias.{name}"]) for name in self.structure.biased)
         held = np.abs(constant) < self.number("breakaway")
         return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
-        """Return how far integrators are from balancing a sticking stage, shape (count,).
+        """Return the imbalance of integrator and constant forces of sticking stages, (count,).
 
         Only constant forces that friction does not hold need balance. `states` have the shape (count, states), or (n,
-        states) for the stage with one `number` alone; then the result has the shape (n,).
+        states) for the stage `number` alone; then the result has the shape (n,).
         """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]
@@ -224,9 +220,8 @@ class Ensemble:
         """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`.
 
         A run begins in the modes that belong to its state. `ends` are states alone, or with the modes if `with_modes`.
-        Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning points are only
-        kept where `least_swing` is given: a limiter that chatters makes so many that runs would have to be repeated
-        with more room.
+        Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning points are kept
+        only with `least_swing`, because a limiter that chatters makes too many.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
@@ -242,9 +237,9 @@ class Ensemble:
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Return which runs end with the switched modes they began with, shape (count,).
+        """Return which runs end in the switched modes in which they began, shape (count,).
 
-        They begin in `states` and end in `ends` (count, kept).
+        Runs begin in `states` and end in `ends` (count, kept).
         """
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)
@@ -252,7 +247,7 @@ class Ensemble:
 
 
 def _with_room(results: Results, room: int) -> Results:
-    """Widen or cut results to room for so many turning points."""
+    """Extend or cut results to room for this many turning points."""
     turns = results.turn_times[:, :room], results.turn_values[:, :room]
     if missing := room - turns[0].shape[1]:
         turns = tuple(np.pad(column, ((0, 0), (0, missing))) for column in turns)

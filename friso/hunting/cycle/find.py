@@ -1,5 +1,4 @@
-"""Find hunting cycles of many stages at once: close them,
-and judge their stability by multipliers."""
+"""Find limit cycles of many stages at once, close them as orbits, and compute their stability."""
 
 from __future__ import annotations
 
@@ -20,10 +19,10 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().cycle_rtol
-"""Default relative tolerance for following cycles."""
+"""Default relative tolerance of closed orbits."""
 
 COARSE_RTOL = ToleranceSettings().guess_rtol
-"""Relative tolerance that suffices for guesses."""
+"""Relative tolerance of runs that only supply guesses."""
 
 
 NO_RETURN = "from every distance the stage swings back less far than it started"
@@ -32,30 +31,30 @@ NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
-"""Reasons after which a cycle may exist although none was found."""
+"""Reasons for a missing cycle after which one may exist all the same."""
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
     """Return the time [s] in which a deviation changes by the factor e.
 
-    It is multiplied once per time `returned` [s].
+    `multiplier` acts once per time `returned` [s].
     """
     return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
 
 
 @dataclass(frozen=True)
 class Cycles(ArrayRows):
-    """One cycle per stage, or none; arrays are NaN where there is none.
+    """One cycle for each stage; arrays are NaN for a stage without one.
 
-    - `sign`: -1 for cycles that are their own mirror image after half a period, over which everything is then taken; 1
-      for others. `swings`: swings in that time.
+    - `sign`: -1 for cycles that are their own mirror image after half a period, to which all numbers then refer; 1 for
+      others. `swings`: swings in that time.
     - `closed` (count,): whether there is a cycle; `reasons` (count,): why there is none.
     - `states` (count, states): on the cycle, in the middle of sticking.
     - `period` [s], `amplitude` [m], half of peak to peak, and `middle` [m] between the peaks, (count,).
     - `gap` (count,): error of closing (see `Orbits`).
     - `local` (count, states - 1): Floquet multipliers, the largest first; `direction` (count, states): of the first.
     - `slope` (count,): macroscopic slope of the return map, where a limiter may chatter.
-    - `multiplier` (count,): the one of the two that decides stability.
+    - `multiplier` (count,): largest multiplier or slope, whichever decides stability.
     """
 
     sign: float
@@ -84,7 +83,7 @@ class Cycles(ArrayRows):
 
     @property
     def uncertain(self) -> np.ndarray:
-        """Return which stages may have a cycle that was not found, shape (count,)."""
+        """Return which stages may have a cycle that the search did not find, shape (count,)."""
         return np.isin(self.reasons.astype(str), UNCERTAIN)
 
     @property
@@ -101,10 +100,7 @@ class Cycles(ArrayRows):
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
-    """Find the symmetric cycle of every stage with symmetric equations.
-
-    It is its own mirror image.
-    """
+    """Find the symmetric cycle, its own mirror image after half a period, of every stage with symmetric equations."""
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
@@ -144,9 +140,9 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
-    """Find one of the pair of asymmetric cycles that a symmetric stage may have.
+    """Find one of the pair of asymmetric cycles of each symmetric stage from the return map, if it has one.
 
-    It is found from the return map. The other of the pair is its mirror image.
+    The other of the pair is its mirror image.
     """
     settings = OrbitSettings.current()
     cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)
@@ -195,14 +191,14 @@ def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
-    """Take over the trial orbits that are closed near their guess."""
+    """Copy the trial orbits that are closed near their guess into `orbits`."""
     good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
-    """Close orbits from the end of a long simulation, where that repeats itself."""
+    """Close orbits from the end of a long simulation, where the simulation repeats."""
     settings = OrbitSettings.current()
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:

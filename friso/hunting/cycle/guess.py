@@ -1,4 +1,4 @@
-"""Guess hunting cycles: fixed points of the return map, and of the way there and back."""
+"""Guess limit cycles: fixed points of the return map over half a period and over a whole one."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Guess:
 
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
-    """Guess the symmetric cycle: the largest distance with an equal landing opposite.
+    """Guess the symmetric cycle: the largest distance from which a stage lands equally far on the other side.
 
-    The return map falls through its diagonal there.
+    There the return map falls through its diagonal.
     """
     settings = OrbitSettings.current()
     low, high = _falling(positive.distances, positive.returns - positive.distances)
@@ -49,11 +49,11 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 
 
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
-    """Guess the cycle over a whole period: a distance from which a stage comes back there.
+    """Guess the cycle over a whole period: a distance to which a stage returns after two landings.
 
-    The distance on the other side differs from it by a share of at least `apart`. Of several, the least different one
-    is taken if `apart` is 0, else the most different one. `positive` and `negative` are the maps of stages that stick
-    on the positive and on the negative side.
+    The distance on the other side differs by a fraction of at least `apart`. Of several guesses the one with the
+    smallest difference is taken if `apart` is 0, else that with the largest. `positive` and `negative` are the maps of
+    stages that stick on the positive and on the negative side.
     """
     settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
@@ -73,11 +73,11 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """Return the distance that returns to itself, among those numbered `goes`, or None.
+    """Return the distance that returns to itself, among the distances numbered `goes`, or None.
 
-    If no distance does, the one that almost does is returned: near a fold both fixed points lie between two points of
-    the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
-    whenever a flip is near.
+    If none does, the one that almost does is returned: near a fold both fixed points lie between two points of the map.
+    With `apart`, places near the symmetric fixed point are left out, because the map almost returns there whenever a
+    flip is near.
     """
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0
@@ -100,10 +100,7 @@ def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the last neighbouring distances between which a function falls through zero.
-
-    NaN if there are none.
-    """
+    """Return the last neighbouring distances between which a function falls through zero; NaN without such a pair."""
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     rows = np.arange(len(rise))
@@ -112,7 +109,7 @@ def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
-    """Return where a function falls through zero, by a straight line between two distances."""
+    """Return the distance at which a function falls through zero, by linear interpolation between two distances."""
     low, high = _falling(distances, rise)
     above, below = _interpolated(low, distances, rise), _interpolated(high, distances, rise)
     return low + (high - low) * above / (above - below)

@@ -15,11 +15,11 @@ from friso.hunting.settings import ToleranceSettings
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
-    """Return distances [m] at which stages stick in motions beside an unstable cycle.
+    """Return distances [m] at which stages stick in lasting motions beside an unstable cycle.
 
-    The return map keeps these motions within a few per cent of the cycle. The shape is (count, KEPT), NaN where there
-    is none. The map is interpolated, so a simulation has to decide whether the motions are attractors. Where a limiter
-    chatters, the map is too rough and the result is NaN.
+    The return map keeps these motions within a few per cent of the cycle. The shape is (count, KEPT), NaN for no
+    motion. The map is interpolated, so a simulation has to decide whether the motions are attractors. The result is NaN
+    where a limiter chatters, because the map is too rough.
     """
     settings = OrbitSettings.current()
     tolerances = ToleranceSettings.current()
@@ -62,10 +62,10 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the deviations, ascending, at which a map keeps motions in its range.
+    """Return the deviations, ascending, at which a map keeps motions within its range after many returns.
 
-    They are reached after many returns. The map takes the deviations `before` a return to those `after` it, each of
-    shape (runs,). A motion that only ever grew is not kept: near a multiplier of 1 or -1 it merely leaves slowly.
+    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). A motion that only ever
+    grew is left out: near a multiplier of 1 or -1 it merely leaves slowly.
     """
     settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)

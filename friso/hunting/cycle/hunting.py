@@ -1,5 +1,4 @@
-"""Find the hunting cycles of one stage, their size, period and stability,
-or the reason why there are none."""
+"""Find the limit cycles of one stage with size, period and stability, or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -35,7 +34,7 @@ UNDECIDED = "simulations that had to decide failed, or had not settled when they
 """Reason given when simulations that had to decide were not completed."""
 
 GIVEN_UP = "the search for what attracts the stage would have taken more work than a check may"
-"""Reason given when the allowance of work was used up."""
+"""Reason given when the search exceeded its allowance of work."""
 
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
@@ -45,13 +44,13 @@ REACHED = "a cycle that attracts at another bandwidth could be followed to this 
 """Reason given when the search through the bandwidths contradicts the survey of the stage itself."""
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
-"""Reason why no cycles are searched for a stage with dither, which may hunt all the same."""
+"""Reason why a stage with dither is not searched for cycles, although it may hunt."""
 
 BY_ITSELF = "its loop is unstable, or not linear even without friction"
 """Reason given when a stage that friction cannot make hunt may still not settle."""
 
 LAGS = "its controller pushes ever harder at standstill, as an integral does, and such cycles are not searched for"
-"""Reason given when a lag in the place of an integral may make a stage hunt."""
+"""Reason given when a lag that replaces the integral may make a stage hunt."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
 """Reason given when an observed swing may grow without bound, as the loop is unstable at lower gains."""
@@ -68,17 +67,17 @@ FARTHER_KICKS = "with a force limit and no anti-windup, kicks larger than those 
 """Reason given when something may attract a stage from farther off than the survey reaches."""
 
 MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
-"""Reason given when a wide dead zone holds most starts of a survey."""
+"""Reason given when most starts of a survey lie within a wide dead zone."""
 
 OUTER_INTEGRALS = (
     "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
 )
-"""Reason given when starts vary the integral of the inner loop alone."""
+"""Reason given when starts vary the integral of the inner loop only."""
 
 SMALL_CYCLES = (
     "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
 )
-"""Reason given when cycles may be smaller than the survey covers, as friction falls so little."""
+"""Reason given when cycles may be smaller than the survey covers, because friction hardly falls with speed."""
 
 NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller than the search covers"
 """Reason given when cycles within a narrow backlash may be smaller than the survey covers."""
@@ -87,26 +86,26 @@ STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how fr
 """Reason given when bristles bend by less than runs resolve."""
 
 RESOLVED_BRISTLES = 10 * TIGHT
-"""Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey:
-at 9e-10 friso's runs find no attractor where the exact map of a stage has a cycle; from 1e-8 on the cycle is there
+"""Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey.
+At 9e-10 runs find no attractor where the exact map of a stage has a cycle; from 1e-8 on they do
 (`benchmarks.oracles`, always)."""
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A hunting cycle.
+    """A limit cycle of a stage.
 
-    - `symmetric`: it is its own mirror image after half a period; its multipliers are then those of half a period.
+    - `symmetric`: it is its own mirror image after half a period, to which its multipliers then refer.
     - `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `period` [s], and `swings` to either side
       in a period.
     - `multipliers`, shape (states - 1,): Floquet multipliers, the largest first, without the trivial one along the
       cycle.
-    - `slope`: slope of the return map over 1 % of the amplitude (NaN where stages so near do not come back).
-    - `multiplier`: the number that decides stability. It is the slope with a stroke limiter, which may chatter, else
-      the largest Floquet multiplier (its modulus if complex).
-    - `growth`: the multiplier as an independent simulation beside the cycle shows it (NaN if that leaves too fast).
-    - `residual`: gap at which the orbit closes, as a share of the magnitudes of its states.
-    - `signals`: one period in time, from where the stage sticks.
+    - `slope`: slope of the return map over 1 % of the amplitude (NaN where such stages do not come back).
+    - `multiplier`: the number that decides stability: the slope with a stroke limiter, which may chatter, else the
+      largest Floquet multiplier (its modulus if complex).
+    - `growth`: the multiplier by an independent simulation beside the cycle (NaN if that leaves too fast).
+    - `residual`: gap at which the orbit closes, relative to the magnitudes of its states.
+    - `signals`: one period in time, from the instant at which the stage sticks.
     """
 
     symmetric: bool
@@ -156,17 +155,17 @@ class Swing:
 
 @dataclass(frozen=True)
 class Hunting:
-    """Cycles and other attractors of a stage.
+    """Limit cycles and other attractors of a stage.
 
-    - `cycles`: hunting cycles, the stable ones first.
-    - `reason`: why there are none, or why it is not `certain` what attracts the stage.
+    - `cycles`: limit cycles, the stable ones first.
+    - `reason`: why there are none, or why the answer is not `certain`.
     - `certain`: every simulation that had to decide was completed.
     - `returns`: return map of the stage sticking on the positive side (None: the stage cannot hunt).
     - `observed`: attracting swings that are none of the cycles.
-    - `target`: motions that do not come to rest end in this (None: nothing attracts).
-    - `surveyed`: the survey itself.
-    - `lower_gains`: stability of the loop far beyond a force limit without anti-windup (None: there is no such limit).
-      Unless it is "stable", large motions may diverge, and an observed swing may be `passing`.
+    - `target`: motion in which all motions end that do not come to rest (None: all come to rest).
+    - `surveyed`: the survey of the stage.
+    - `lower_gains`: stability of the loop far beyond a force limit without anti-windup (None: no such limit). Unless it
+      is "stable", large motions may diverge, and an observed swing may be `passing`.
     """
 
     cycles: tuple[Cycle, ...]
@@ -185,7 +184,7 @@ class Hunting:
 
     @property
     def passing(self) -> bool:
-        """Tell whether an observed swing may be transient, growing or slowly dying out.
+        """Tell whether an observed swing may be transient, growing or slowly decaying.
 
         Its size is then only the size at which the run was stopped.
         """
@@ -198,18 +197,12 @@ class Hunting:
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Return why a stage cannot hunt whatever its numbers; "" if it may.
-
-    It also says why cycles are not searched (`DITHERS`).
-    """
+    """Return why a stage cannot hunt whatever its numbers, or why it is not searched (`DITHERS`); "" if it may hunt."""
     return why_not(structure(stage.flat()))
 
 
 def why_not(form: Structure) -> str:
-    """Return why stages of this structure cannot hunt, or why cycles are not searched.
-
-    "" if they may hunt.
-    """
+    """Return why stages of this structure cannot hunt, or are not searched; "" if they may hunt."""
     drive = form.transmission
     if form.friction == "none" and (drive is None or (drive.friction == "none" and not drive.backlash)):
         return "there is no friction to stick to"
@@ -220,11 +213,10 @@ def why_not(form: Structure) -> str:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
-    """Find the hunting cycles of a stage, and everything else that attracts it.
+    """Find the limit cycles and other attractors of a stage, whatever its own motion.
 
-    The motion of the stage file plays no part. Cycles are closed to a relative tolerance. The search may use so much
-    `work` (see `friso.engine.allowance`); anything not settled by then is not certain. Raises InputError for a
-    tolerance that is not usable.
+    Cycles are closed to a relative tolerance. The search may use so much `work` (see `friso.engine.allowance`);
+    anything open by then is not certain. Raises InputError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
@@ -261,8 +253,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
     """Return for which stages the attractors are certain, shape (count,).
 
-    The survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed (None): they
-    are certain if they keep up no other swing.
+    The survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed (None), and
+    are certain if no other swing lasts.
     """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
@@ -270,7 +262,7 @@ def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
 
 
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
-    """Return why something may attract stages beyond a survey, words (count,), "" for nothing."""
+    """Return why something may attract stages beyond the reach of a survey, words (count,); "" if nothing can."""
     why = np.full(stages.count, "", dtype=object)
     far, farther = far_beyond_a_limit(stages), np.zeros(stages.count, bool)
     if far is not None:
@@ -284,9 +276,10 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 
 
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Return why something may attract stages without an attractor, words of shape (count,).
+    """Return why something may attract stages in which the survey found no attractor, as texts (count,).
 
-    It is "" for no reason. `farther`, (count,), marks stages that may swing on from farther off than was tried.
+    A text is "" without a reason. `farther`, (count,), marks stages that may keep swinging from larger distances than
+    were tried.
     """
     settings = OrbitSettings.current()
     if stages.outer_integrals:
@@ -316,10 +309,7 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Return which stages may have cycles smaller than the survey covers, shape (count,).
-
-    They have friction.
-    """
+    """Return which of the stages, all with friction, may have cycles smaller than the survey covers, (count,)."""
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
@@ -370,7 +360,7 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
 
 
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
-    """Return the growth of a small deviation per return, from a simulation near the cycle."""
+    """Return the growth of a small deviation from a cycle per return, from a simulation."""
     settings = OrbitSettings.current()
     away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
     heights = returns_of(

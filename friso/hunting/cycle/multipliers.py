@@ -1,6 +1,6 @@
-"""Compute the growth of deviations from a cycle per return.
+"""Compute the growth of deviations from a cycle per return, for small and for finite deviations.
 
-Floquet multipliers give it for small deviations, the slope of the return map over a small but finite range.
+Floquet multipliers describe small deviations, the slope of the return map finite ones.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ class Multipliers:
     """Floquet multipliers of orbits, without the trivial one along the cycle.
 
     `local` (count, states - 1) has the largest first. `direction` (count, states) belongs to the first, scaled to a
-    position of 1. `slope` (count,) is the macroscopic slope of the return map along it, NaN where no limiter chatters.
-    `high` and `low` [m] (count,) are the extremes of the position on the orbit.
+    position of 1. `slope` (count,) is the macroscopic slope of the return map along that direction, NaN where no
+    limiter chatters. `high` and `low` [m] (count,) are the extremes of the position on the orbit.
     """
 
     local: np.ndarray
@@ -72,9 +72,9 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
 
 def _straight(pairs: np.ndarray) -> float:
-    """Fit a straight line through pairs (points, 2) without outliers; return its slope.
+    """Fit a straight line without outliers to pairs (points, 2); return its slope, NaN with too few pairs.
 
-    NaN with too few pairs. An outlier arises where the stage does not break away.
+    A stage that does not break away makes an outlier.
     """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:
@@ -93,7 +93,8 @@ def returns_of(
 ) -> np.ndarray:
     """Measure how far stages swing [m] on each return, (count, points, returns).
 
-    They begin beside their orbits, along a direction (count, states), at shares (1, points) of the sticking distance.
+    Runs begin beside their orbits, along a direction (count, states), at fractions (1, points) of the sticking
+    distance.
     """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]

@@ -1,4 +1,4 @@
-"""Make states of stages stuck off their reference, from where hunting starts."""
+"""Make states of stages stuck away from their reference, from which hunting starts."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float 
     Bristles are relaxed. The actuator exerts no force, or balances constant forces that friction does not hold.
     Integrals of outer loops have `wound` up for a time [s].
 
-    A stage stuck here winds up until it breaks away, and by then its past no longer matters. So these states are a line
-    through all hunting cycles with sticking, and the distance to the reference decides what follows. Integrals in
-    several loops are the exception.
+    A stage stuck there winds up until it breaks away, which erases its past. These states form a line through all
+    cycles with sticking, and the distance to the reference decides what follows, unless several loops have integrals.
     """
     states = stages.settled(Steady(-displacement, displacement, force=stages.balancing))
     states[:, stages.outer_integrals] = np.reshape(-displacement * wound, (-1, 1))
@@ -39,20 +38,17 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
-    """Return states of stages at their reference, all masses moving at a velocity [m/s].
-
-    Everything else is zero.
-    """
+    """Return states of stages at their reference with all masses moving at a velocity [m/s], everything else zero."""
     states = np.zeros((stages.count, len(stages.kernel.states)))
     states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which the integrator winds up to break-away, (count,).
+    """Return the time [s] in which the integrator of a sticking stage winds up to break-away, (count,).
 
-    The stage sticks meanwhile. Where the integrator pauses, it is a time in which the loop moves. It is never longer
-    than an integrator with a leak winds.
+    If the integrator pauses, it is a time in which the loop moves. It is never longer than an integrator with a leak
+    winds.
     """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)

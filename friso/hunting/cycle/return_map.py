@@ -17,8 +17,8 @@ from friso.hunting.cycle.swings import swings
 class ReturnMap:
     """Return map of each stage from one side of the reference, shape (count, points).
 
-    `distances` [m], ascending, are where the stage sticks at first. `returns` [m] are how far on the other side it
-    sticks next: negative if it stops short, 0 if it does not break away. `times` [s] are how long it takes.
+    `distances` [m], ascending, are the first sticking positions. `returns` [m] are the next ones on the other side:
+    negative for a stage that stops short, 0 for one that does not break away. `times` [s] are the durations.
     """
 
     distances: np.ndarray
@@ -30,7 +30,7 @@ class ReturnMap:
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     """Compute the map of stages that stick on one side, 1 or -1, of their reference.
 
-    The map is finer where the stage might return as far.
+    The map is finer where a stage may land as far off as it started.
     """
     settings = OrbitSettings.current()
     coarse = np.geomspace(*settings.map_range, settings.map_points)[None, :] * stages.length[:, None]

@@ -1,4 +1,4 @@
-"""Settings of closed orbits: how cycles are guessed, closed, and told from each other."""
+"""Settings of closed orbits: how limit cycles are guessed, closed, and distinguished."""
 
 from __future__ import annotations
 
@@ -9,147 +9,148 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class OrbitSettings(Settings):
-    """Settings of orbits: guesses of cycles, Newton's method that closes them, and multipliers."""
+    """Settings of orbits: guesses of cycles, Newton's method, and multipliers."""
 
     frictionless_size: float = setting(1e-6, "m")
-    """A stage without friction is linear, so any size of the motion will do."""
+    """Size of the motion of a stage without friction. It is linear, so any size will do."""
 
     least_asymmetry_share: float = setting(0.05, "")
-    """Guesses that lean by less lead to the symmetric cycle."""
+    """Smallest asymmetry of a guess of an asymmetric cycle. With less, the guess leads to the symmetric cycle."""
 
     least_lean_share: float = setting(1e-3, "of the amplitude")
-    """An orbit that leans by less is the symmetric one."""
+    """Smallest offset of the middle of an asymmetric cycle. With less, the orbit is the symmetric one."""
 
     guess_variants: tuple[tuple[float, float], ...] = setting(
         ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0)), ""
     )
-    """Factors on the guessed distance and time, tried in turn: more variants close hardly any further orbit."""
+    """Factors on the guessed distance and time, tried in turn. More variants close hardly any further orbit."""
 
     kept_distance_share: float = setting(0.5, "")
-    """An orbit farther from its guess is another one, such as the rest that every stage has."""
+    """Largest distance of an orbit from its guess. Farther off it is another solution, such as rest."""
 
     guess_returns: int = setting(40, "returns")
     """Returns that are simulated to find an attractor where no orbit closes near a guess."""
 
     steady_return_share: float = setting(0.02, "")
-    """A simulation whose returns still change by more has not come to a cycle."""
+    """Largest change of the last returns of a simulation that has reached a cycle."""
 
     refined_distances: int = setting(8, "")
-    """More distances bracket a fixed point of the map closer than Newton's method needs."""
+    """Distances between which a fixed point of the map is bracketed for Newton's method."""
 
     unwinding_wait_share: float = setting(0.4, "waits")
-    """Time from landing until the actuator only balances constant forces, as a share of the wait."""
+    """Time from landing until the actuator only balances constant forces, as a fraction of the wait."""
 
     almost_return_log: float = setting(0.03, "")
-    """Returns that miss by more are no guesses of a cycle."""
+    """Largest error of a return that serves as the guess of a cycle."""
 
     held_range_share: float = setting(0.06, "of the distance")
-    """Lasting motions beside an unstable cycle lie within this range."""
+    """Range beside an unstable cycle in which lasting motions are looked for."""
 
     held_runs: int = setting(61, "")
-    """Ranges narrower than a step between runs are missed; more runs take longer."""
+    """Runs over the range beside a cycle. Ranges narrower than a step are missed; more runs take longer."""
 
     held_break_runs: int = setting(12, "")
-    """An attractor beside a break of the map may be as narrow as a step between runs."""
+    """Runs added at a break of the map. An attractor beside the break may be as narrow as a step."""
 
     held_returns: int = setting(3, "returns")
-    """The map is then also known at the distances to which it leads."""
+    """Returns of each run. The map is then also known at the distances to which it leads."""
 
     nearest_start_share: float = setting(1e-3, "of the distance")
-    """Closer to a cycle, rounding decides where a run goes."""
+    """Start nearest to a cycle. Closer to it, rounding decides where a run goes."""
 
     held_map_steps: int = setting(500, "")
-    """Slow motions beside a cycle need hundreds of returns, which the map gives at once."""
+    """Iterations of the map beside a cycle, because slow motions need hundreds of returns."""
 
     held_starts: int = setting(12, "")
-    """More starts than these repeat much the same motions."""
+    """Most starts returned. Further starts repeat much the same motions."""
 
     beside_cycle_share: float = setting(2e-3, "of the distance")
-    """Start of a simulation beside a cycle: closer, rounding decides where it goes."""
+    """Start of a simulation beside a cycle. Closer to it, rounding decides where the run goes."""
 
     beside_cycle_returns: int = setting(8, "returns")
-    """Enough to see whether deviations grow; more leave the range that is linear."""
+    """Returns over which deviations are seen to grow or shrink. More leave the linear range."""
 
     linear_deviation_share: float = setting(0.02, "of the distance")
-    """Larger deviations do not grow as the multiplier says."""
+    """Largest deviation that grows as the multiplier says."""
 
     least_friction_fall: float = setting(0.002, "of break-away")
-    """With less fall of friction, cycles are smaller than the search covers."""
+    """Smallest fall of friction with speed for which the search covers all cycles."""
 
     no_friction_fall: float = setting(1e-9, "of break-away")
-    """A fall below it is rounding of the friction curve."""
+    """Fall of friction that is only rounding of the friction curve."""
 
     least_feeding_ratio: float = setting(0.05, "")
-    """The least fall over amplitude with which a cycle was found was forty times as much."""
+    """Smallest ratio of the fall of friction to amplitude that can feed a cycle. The least found was forty times
+    larger."""
 
     fastest_friction_speed: float = setting(1e7, "speeds of small swings")
-    """Beyond this speed friction curves no longer fall."""
+    """Highest speed at which friction curves are examined. Beyond it they no longer fall."""
 
     friction_speeds: int = setting(300, "")
-    """Thirty per decade: a fall of friction is broader."""
+    """Speeds at which friction curves are examined: thirty per decade, because a fall of friction is broader."""
 
     least_certain_swing: float = setting(0.001, "deflections at break-away")
-    """Smaller cycles may be missed: runs resolve them badly."""
+    """Smallest swing that counts as resolved. Runs resolve smaller cycles badly and may miss them."""
 
     feeding_ratio_range: tuple[float, float] = setting((2.0, 6.0), "")
     """Least and largest ratio of the fall of friction over the speeds of a cycle to its amplitude."""
 
     wide_dead_zone: float = setting(2.0, "deflections at break-away")
-    """Most starts of a survey lie within a wider one, where nothing winds up."""
+    """Width of a dead zone beyond which most starts of a survey lie within it, where nothing winds up."""
 
     friction_stages_at_once: int = setting(64, "")
-    """Hundreds of speeds each: more stages at once take too much memory."""
+    """Stages whose friction curves are examined at once. More take too much memory."""
 
     trace_samples: int = setting(2000, "")
-    """Samples of a period that are drawn: fewer show corners where a stage breaks away."""
+    """Samples of a drawn period. With fewer, curves have corners where a stage breaks away."""
 
     slope_range_share: float = setting(0.01, "of the distance")
-    """Range of the slope where a limiter chatters: over less, the slope follows the chatter."""
+    """Range of the return map's slope where a limiter chatters. Over a smaller one the slope follows the chatter."""
 
     slope_runs: int = setting(41, "")
-    """A line through fewer returns follows their scatter."""
+    """Runs through which the slope is fitted. Fewer follow the scatter of returns."""
 
     least_slope_runs: int = setting(30, "")
-    """If fewer runs come back, the range reaches beyond a break of the map."""
+    """Fewest runs that must come back. With fewer, the range reaches beyond a break of the map."""
 
     near_return_share: float = setting(0.25, "of the range")
-    """Returns farther off the others belong to another branch of the map."""
+    """Largest distance of a return from the others. Farther off it belongs to another branch of the map."""
 
     leak_time_constants: float = setting(10.0, "time constants")
-    """By then the integrator of a stuck stage is 5e-5 off its end."""
+    """Time after which the integrator of a stuck stage is 5e-5 off its final value."""
 
     map_points: int = setting(32, "")
-    """Fixed points closer than a step are missed; the map is refined where it turns."""
+    """Points of a return map before refinement. Fixed points closer than a step are missed."""
 
     map_range: tuple[float, float] = setting((0.02, 2.0), "deflections at break-away")
-    """Smaller swings creep home; from farther off, a stage does not stick."""
+    """Range of a return map. From nearer a stage creeps home; from farther off it does not stick."""
 
     breakaway_waits: float = setting(2.0, "waits")
-    """A stage that takes longer to break away creeps home."""
+    """Longest wait for break-away. A stage that takes longer creeps home."""
 
     flight_time: float = setting(60.0, "1/natural frequencies")
-    """A way across that takes longer is creeping."""
+    """Longest crossing of a stage to the other side. One that takes longer creeps."""
 
     newton_steps: int = setting(40, "")
-    """Orbits that need more steps do not close."""
+    """Most Newton steps. Orbits that need more do not close."""
 
     fresh_jacobian_gap: float = setting(1e-5, "of the states")
-    """Farther from an orbit, an old Jacobian misleads Newton's method."""
+    """Gap beyond which an old Jacobian misleads Newton's method."""
 
     old_jacobian_share: float = setting(0.1, "")
-    """An old Jacobian is kept while each step shrinks the gap at least to this share."""
+    """Least reduction of the gap per step that keeps an old Jacobian in use."""
 
     stalled_steps: tuple[int, int, int] = setting((3, 8, 1), "")
-    """Steps in which the gap must halve, far from an orbit, near it and closed; otherwise the search ends."""
+    """Steps in which the gap must halve, or the search ends: far from an orbit, near it, and once closed."""
 
     newton_stride: float = setting(0.3, "")
-    """Longer steps leave the range in which Newton's method converges to this orbit."""
+    """Longest Newton step, relative to the states. Longer ones leave the range of convergence."""
 
     followed_stalled_steps: tuple[int, int, int] = setting((3, 3, 1), "")
-    """Steps in which the gap must halve along a branch: the next orbit is near, and closes soon or not at all."""
+    """Steps in which the gap must halve along a branch, where the next orbit is near."""
 
     place_nudge: float = setting(1e-5, "")
-    """A smaller change of place is rounding; a larger one suffers from curvature."""
+    """Change of place for a numerical derivative. If smaller it is rounding; if larger it includes curvature."""
 
     swing_leg_share: float = setting(0.5, "of the distance")
-    """Smaller legs are ringing of a stage that has landed."""
+    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing after landing."""

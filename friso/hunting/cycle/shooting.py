@@ -1,5 +1,4 @@
-"""Close periodic orbits by Newton's method on the flow over a period,
-or over half of it followed by the mirror."""
+"""Close periodic orbits by Newton's method on the flow over a period, or over half a period and the mirror image."""
 
 from __future__ import annotations
 
@@ -34,12 +33,12 @@ class Shot:
 
 @dataclass(frozen=True)
 class Orbits(ArrayRows):
-    """Closed orbits.
+    """Orbits, closed or not.
 
-    `states` (count, states) has one state of each. `times` [s] (count,) is the time after which it comes back, or to
-    its mirror image if `sign` is -1. `gaps` (count,) is the error left, as a share of the states' magnitudes. `closed`
-    (count,) says whether Newton's method came close enough. `swings` counts swings in that time: one in half a period
-    of the simplest cycles, two in a whole one.
+    `states` (count, states) has one state of each orbit. `times` [s] (count,) is the time after which the orbit returns
+    to that state, or to its mirror image if `sign` is -1. `gaps` (count,) is the remaining error relative to the
+    states' magnitudes. `closed` (count,) tells whether Newton's method converged. `swings` counts swings in that time:
+    one in half a period of the simplest cycles, two in a whole one.
     """
 
     states: np.ndarray
@@ -51,11 +50,10 @@ class Orbits(ArrayRows):
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Follow orbits for times [s] (count,), with a small deviation along every state.
+    """Integrate orbits from states (count, states) for times [s] (count,), with a deviation along every state.
 
-    They start in states (count, states). One deviation is computed rather than run, along the state with the largest
-    rate: the flow carries the rates at the start to those at the end. Where modes remember, a state alone does not
-    give the rates, so all deviations are run.
+    One deviation is computed rather than run, along the state with the largest rate: the flow carries the rates at the
+    start to those at the end. Where modes remember, a state alone does not give the rates, so all deviations are run.
     """
     count, size = states.shape
     rows, before = np.arange(count)[:, None], stages.rates(states)
@@ -89,13 +87,12 @@ def close(
 ) -> Orbits:
     """Close orbits from guesses: states (count, states) that stick, and times [s] (count,).
 
-    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. `swings` are those in that time, by default
-    as few as possible. The phase is fixed where the integrator makes the actuator balance the constant forces on a
-    stage at rest, or exert none without these.
+    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. `swings` counts swings in that time, by
+    default as few as possible. The phase is fixed at the instant at which the integrator balances the constant forces
+    on a stage at rest.
 
-    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's
-    derivative changes from one nanometre to the next and is useless. The last Jacobian from farther away is then kept
-    for all further steps.
+    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's derivative
+    changes from one nanometre to the next, so the last Jacobian from farther away is kept.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
@@ -103,9 +100,9 @@ def close(
 
 @dataclass(frozen=True)
 class Border:
-    """A plane for each branch, on which its next orbit is sought to follow it around folds.
+    """A plane for each branch on which its next orbit is sought, so that the branch can be followed around folds.
 
-    Its space is that of the place along the branch, log distance [m] and log time [s]. An orbit lies on it if normal @
+    The space is place along the branch, log distance [m] and log time [s]. An orbit lies on the plane if normal @
     (place, log distance, log time) = level; shapes (count, 3) and (count,).
     """
 
@@ -114,7 +111,7 @@ class Border:
 
 
 Family = Callable[[np.ndarray, np.ndarray], Ensemble]
-"""Stages that depend on one number each, their place: a function of their numbers (count,) and places (count,)."""
+"""Stages that depend on one number each, their place, as a function of stage numbers (count,) and places (count,)."""
 
 
 class Followed(NamedTuple):
@@ -140,11 +137,11 @@ def close_along(
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
 ) -> Followed:
-    """Close orbits as `close` does, while stages move until each orbit lies on its border.
+    """Close orbits as `close` does, while stages move along lines until each orbit lies on its border.
 
-    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place.
-    With `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians
-    may belong to another line through the keys: further steps learn the derivative along this one.
+    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place. With
+    `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians may
+    belong to another line through the keys: further steps learn the derivative along this line.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
@@ -158,10 +155,7 @@ _S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
-    """Orbits on their way to being closed, all at once.
-
-    An orbit that is closed or has failed is left alone.
-    """
+    """Newton's method on several orbits at once; an orbit that is closed or has failed is left alone."""
 
     def __init__(
         self,
@@ -233,11 +227,11 @@ class _Shooting:
         return jacobians
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """Return the phase error, (orbits, 1): the integrator's imbalance with constant forces."""
+        """Return the phase error, (orbits, 1): the imbalance of integrator and constant forces."""
         return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Keep orbits that are closer than before; stop those that are closed, fail or stall."""
+        """Store orbits that are closer than before; stop the ones that are closed, fail or stall."""
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -254,9 +248,9 @@ class _Shooting:
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a Newton step of one orbit, limited in length, and return it.
+        """Take a Newton step of limited length for one orbit, and return it.
 
-        `scales` are those of its states.
+        `scales` are the magnitudes of the states.
         """
         settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
@@ -328,7 +322,7 @@ class _Following(_Shooting):
         return step
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Keep the Jacobians of the best orbits so far as well."""
+        """Store the best orbits so far with their Jacobians."""
         if not self.chatters:
             better = which[gaps < self.gaps[which]]
             self.best_jacobians[better] = self.jacobians[better]
@@ -361,7 +355,7 @@ class _Following(_Shooting):
         return self.jacobians[which]
 
     def _beside(self, which: np.ndarray) -> np.ndarray:
-        """Run the orbits with their stages a little farther back and ahead along their lines.
+        """Run the orbits with their stages slightly before and after their places on the lines.
 
         Returns the ends and the phase errors, shape (2, orbits, states + 1).
         """
@@ -381,7 +375,7 @@ class _Following(_Shooting):
 
 
 def _iterated(shooting: _S) -> _S:
-    """Take Newton steps until all orbits are closed or get no closer."""
+    """Take Newton steps until all orbits are closed or stall."""
     for _ in range(OrbitSettings.current().newton_steps):
         if not shooting.advance():
             break
@@ -389,7 +383,7 @@ def _iterated(shooting: _S) -> _S:
 
 
 def _inverse(jacobian: np.ndarray) -> np.ndarray:
-    """Invert a matrix; NaN if it is singular."""
+    """Invert a matrix; return NaN if it is singular."""
     try:
         return np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:

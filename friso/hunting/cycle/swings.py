@@ -1,5 +1,4 @@
-"""Find the swings of many runs at once: the extrema of the zigzag that each stage draws
-about its reference."""
+"""Find the swings of many runs at once: the extrema of the zigzag of each stage about its reference."""
 
 from __future__ import annotations
 
@@ -14,10 +13,7 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """The first swings of runs, (runs, swings): turning points [m] and times [s].
-
-    NaN beyond the last.
-    """
+    """First swings of runs, (runs, swings): turning points [m] and times [s], NaN after the last one."""
 
     values: np.ndarray
     times: np.ndarray
@@ -26,8 +22,8 @@ class Swings:
 def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
     """Return the first `most` swings of stages that start at rest; a failed run has none.
 
-    Stages start from states (count, states) and are followed for durations [s] (count,). An extremum counts once the
-    way back from it is a leg long, or the run is over.
+    Stages start from states (count, states) and run for durations [s] (count,). An extremum counts once the way back is
+    one leg long, or the run is over.
     """
     position = starts[:, stages.kernel.position]
     legs = OrbitSettings.current().swing_leg_share * np.abs(position)
@@ -40,10 +36,10 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
 
 def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where [m] and when [s] runs turned last, (runs, most), the last swing last.
+    """Return where [m] and when [s] runs turned last, (runs, most), the last swing in the last column.
 
-    The columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a
-    run ends does not count.
+    Columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a run
+    ends does not count.
     """
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
@@ -59,7 +55,7 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 
 
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
-    """Follow the zigzags column by column; `side` is the side on which they start."""
+    """Find the turning points of zigzags column by column; `side` is the side on which they start."""
     runs = len(values)
     rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))

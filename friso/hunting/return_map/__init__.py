@@ -1,2 +1,1 @@
-"""Judge hunting by the return map: from the distance at which a stage lands to where it
-lands next."""
+"""Judge hunting by the return map, which gives the next landing distance from the present one."""

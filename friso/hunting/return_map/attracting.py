@@ -1,5 +1,4 @@
-"""Find attractors of stages by their return maps: follow each attractor of a map by a run,
-and close it as an orbit."""
+"""Find limit cycles of stages by their return maps: follow each attractor of a map by a run, and close an orbit."""
 
 from __future__ import annotations
 
@@ -21,7 +20,7 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 UNCLOSED = "an attractor of the map was not closed as an orbit that attracts"
 LOST = "runs were not completed"
 SCATTERS = "landings at equal distances return differently: the stage remembers more than its distance"
-"""Why it is not known what attracts a stage."""
+"""Reason why a return map does not decide: landings at equal distances continue differently."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class MapSurvey:
     """Result of surveying stages by their return maps.
 
     `mapped` are the runs, `motions` the stable orbits, `repelling` the unstable ones. A stage is `undecided`, shape
-    (count,), if its map still has an attractor that was not closed as a stable orbit.
+    (count,), if its map has an attractor that was not closed as a stable orbit.
     """
 
     mapped: Mapped
@@ -39,10 +38,7 @@ class MapSurvey:
 
     @property
     def doubts(self) -> np.ndarray:
-        """Return why the map of a stage does not decide what attracts it, words (count,).
-
-        "" if it does.
-        """
+        """Return why the map of a stage does not decide which motions are stable, words (count,); "" if it decides."""
         settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
@@ -57,7 +53,7 @@ class MapSurvey:
 
     @property
     def resolved(self) -> np.ndarray:
-        """Return which stages have a map that decides what attracts them, shape (count,)."""
+        """Return which stages have a map that decides which motions are stable, shape (count,)."""
         return np.equal(self.doubts, "")
 
     @property
@@ -70,7 +66,7 @@ class MapSurvey:
 
 @dataclass(frozen=True)
 class _Proposal:
-    """An attractor of a stage's map, and the run to continue near it."""
+    """An attractor of a stage's map, and the run that is continued near it."""
 
     stage: int
     attractor: MapAttractor
@@ -108,7 +104,7 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """Return attractors of maps not closed as orbits yet, if a run near them can go on."""
+    """Return attractors of maps that are not closed as orbits yet, if a run near them can be continued."""
     lengths = mapped.stages.length
 
     def is_any(new: _Proposal, closed: list[Swinging], exactly: bool) -> bool:
@@ -123,7 +119,7 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """Return the attractors of all maps, each with the run of its basin that ended nearest."""
+    """Return the attractors of all maps, each with the run of its basin that ended nearest to it."""
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):
         for attractor in landing_map.attractors:
@@ -140,10 +136,10 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 
 
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
-    """Tell whether an attractor of a map is a given closed cycle of its stage.
+    """Tell whether an attractor of a map is a given closed cycle of its stage, by size and number of landings.
 
-    They are compared by size and number of landings. With `exactly`, the numbers of landings must be equal; otherwise
-    one may be a multiple. `length` [m] is the deflection of the loop by the break-away force.
+    With `exactly`, the numbers of landings must be equal; otherwise one may be a multiple. `length` [m] is the
+    deflection of the loop by the break-away force.
     """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
@@ -159,7 +155,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
 
 
 def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
-    """Close orbits from runs that repeat themselves; sort them into stable and unstable."""
+    """Close orbits from runs that repeat; add them to the stable and unstable ones."""
     landings, owners = mapped.landings.take(runs), mapped.owners[runs]
     sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
     for k, owner in enumerate(owners.tolist()):
@@ -184,9 +180,9 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 
 
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
-    """Return the smallest number of swings after which a run's last landings repeat.
+    """Return the smallest number of swings, at least `least`, after which a run's last landings repeat; 0 if none.
 
-    It is at least `least`, and 0 if they do not. `path` has the shape (landings,).
+    `path` has the shape (landings,).
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

@@ -1,5 +1,4 @@
-"""Check that runs land where the return maps predict: where a stage rests,
-where it swings on, and in the widest gap."""
+"""Check by runs that stages land where the return maps predict."""
 
 from __future__ import annotations
 
@@ -14,16 +13,16 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.settings import ToleranceSettings
 
 PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
-"""Shares of the list of starts, in order of distance, at which runs are checked."""
+"""Fractions of the list of starts, in order of distance, at which runs are checked."""
 
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     """Return for which stages runs land where the map predicts, in the shape of `numbers`.
 
     Runs begin stuck at three distances from which the stage rests, at three from which it swings on, and in the widest
-    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth
-    of it. From the second landing on, each must lie where the map predicts it from the one before, within the allowed
-    scatter.
+    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth of
+    it. From the second landing on, every landing must lie within the allowed scatter of its prediction from the one
+    before.
     """
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])

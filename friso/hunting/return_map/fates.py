@@ -1,5 +1,4 @@
-"""Decide which motions swing for ever: a run shows where they land,
-the return map what follows."""
+"""Decide which motions swing for ever: a run shows where they land, and the return map what follows."""
 
 from __future__ import annotations
 
@@ -21,11 +20,11 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 def motions_go_on(
     flat: Mapping[str, Any], count: int, landing_map: LandingMap, starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which motions of one stage swing for ever, and for which this is known.
+    """Return which motions of one stage swing for ever, and for which this is known, both (count,).
 
-    Both have the shape (count,). The stage is given as flat keys to SI numbers or arrays (count,). Motions are given
-    by these keys, or by the states in which they begin at rest at the reference, `starts` (count, states). The result
-    is unknown if the reference does not come back to its start.
+    The stage is given as flat keys to SI numbers or arrays (count,). Motions are given by these keys, or by initial
+    states at rest at the reference, `starts` (count, states). The result is unknown if the reference does not come back
+    to its start.
     """
     if starts is not None:
         return _go_on(Ensemble.held(flat, count), starts, landing_map)
@@ -42,7 +41,7 @@ def motions_go_on(
 
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs swing for ever, by where they land, and which are known, (runs,)."""
+    """Return which runs swing for ever, by where they land, and for which this is known, (runs,)."""
     settings = ReturnMapSettings.current()
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)

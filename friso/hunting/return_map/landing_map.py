@@ -16,10 +16,10 @@ from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import ReturnMapSettings
 
 OTHER_SIDE = 1e3
-"""Shift of places on the negative side."""
+"""Shift of the coordinate of places on the negative side."""
 
 REST = -1e6
-"""Place of a stage that rests, or has diverged."""
+"""Coordinate of a stage that rests, or has diverged."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,8 @@ class MapAttractor:
     """An attractor of a return map.
 
     `distances`, shape (swings,), are signed distances of successive landings, in deflections of the loop by the
-    break-away force. `basin` (points,) are the points of the map that come to it. It is a cycle of so many swings if
-    `periodic`; otherwise the distances are the last landings of an irregular motion.
+    break-away force. `basin` (points,) are the points of the map that lead to the attractor. It is a cycle of that many
+    swings if `periodic`; otherwise the distances are the last landings of an irregular motion.
     """
 
     distances: np.ndarray
@@ -38,7 +38,7 @@ class MapAttractor:
 
 @dataclass(frozen=True)
 class LandingMap:
-    """The return map of one stage, points in ascending order of distance.
+    """Return map of one stage, points in ascending order of distance.
 
     - `before` (points,): signed distances of landings; without sign where the stage is `symmetric`.
     - `after` (points,): distances of the next landings, 0 where the stage rests, infinite where it diverges.
@@ -60,8 +60,8 @@ class LandingMap:
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
         """Make the map from the landings of runs of one stage.
 
-        The starts are left out, because the next landing depends on how the run began. `length` [m] is the deflection
-        of the loop by the break-away force.
+        The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
+        deflection of the loop by the break-away force.
         """
         settings = SurveySettings.current()
         distances = landings.distances / length
@@ -81,12 +81,12 @@ class LandingMap:
         return cls(before[order], after[order], run[order], final[order], symmetric, lost)
 
     def renumbered(self, runs: np.ndarray) -> LandingMap:
-        """Return the map with other numbers of its runs, shape (runs,)."""
+        """Return the map with its runs renumbered as in `runs`, shape (runs,)."""
         return replace(self, run=runs[self.run])
 
     @property
     def sides(self) -> tuple[float, ...]:
-        """Return the signs of the sides on which landings differ."""
+        """Return the signs of the sides that the map treats separately."""
         return (1.0,) if self.symmetric else (1.0, -1.0)
 
     def points(self, side: float) -> np.ndarray:
@@ -95,7 +95,7 @@ class LandingMap:
 
     @property
     def gain(self) -> np.ndarray:
-        """Return the distance of the next landing over that of the last one, shape (points,)."""
+        """Return the distance of the next landing over that of the present one, shape (points,)."""
         return np.abs(self.after / self.before)
 
     @cached_property
@@ -153,16 +153,13 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """Return the attractors of the map that swing for ever, by iteration from its points."""
+        """Return the attractors of the map in which a stage swings for ever, by iteration from all points."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))
 
     def _followed(self, at: np.ndarray) -> np.ndarray:
-        """Iterate the map until it is on an attractor; return the last landings.
-
-        They have the shape (points, landings).
-        """
+        """Iterate the map until it is on an attractor; return the last landings, (points, landings)."""
         settings = ReturnMapSettings.current()
         survey_settings = SurveySettings.current()
         iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
@@ -190,11 +187,11 @@ class LandingMap:
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
-        """Predict the signed distances of the next landings, (count,), 0 where the stage rests."""
+        """Predict the signed distances of the next landings, (count,); 0 for a stage that comes to rest."""
         return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
-        """Return which landings, given by signed distances, swing for ever, shape (count,)."""
+        """Return which landings, given by signed distances, lead to swinging for ever, shape (count,)."""
         return np.all(self._followed(self._places(distances)) > REST, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
@@ -204,7 +201,7 @@ class LandingMap:
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
-        """Yield each attractor once, from paths of places on them, shape (points, landings)."""
+        """Yield each attractor once, from paths of places on the attractors, shape (points, landings)."""
         settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
         while left.any():
@@ -218,9 +215,9 @@ class LandingMap:
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
-        """Return the growth of a small deviation from an attractor per repetition, by the map.
+        """Return the growth of a small deviation from an attractor per repetition, by the map, without sign.
 
-        It has no sign, and is infinite if the attractor does not repeat itself.
+        It is infinite if the attractor does not repeat.
         """
         if not attractor.periodic:
             return np.inf
@@ -229,11 +226,10 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """Return the largest relative error of a landing predicted by its neighbours.
+        """Return the largest relative error of a landing predicted by its neighbours, and the distance of that landing.
 
-        The second result is its distance. It is infinite if a stage rests between two landings that go on alike, or
-        the reverse. It is 0 if no three points are close together. Only points count whose next landing is at more
-        than half of their distance.
+        The error is infinite if a stage rests between two landings that continue alike, or the reverse. It is 0 if no
+        three points are close together. Only points whose next landing is at more than half of their distance count.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
@@ -269,10 +265,10 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out landings beyond `farthest_sticking` from which a run comes back.
+    """Leave out landings beyond `farthest_sticking` from which a run comes back, and count the remaining ones.
 
-    Also count the rest after the start. From so far a stage passes its reference without sticking, so distance alone
-    does not decide what follows. `distances` have the shape (runs, landings), the start first.
+    From so far a stage passes its reference without sticking, so distance alone does not decide what follows.
+    `distances` have the shape (runs, landings), the start first; the count excludes the start.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
     near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
@@ -284,9 +280,9 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return the smallest difference between places of paths and those a cycle before.
+    """Return the smallest difference, (points,), between places of paths and those one cycle earlier.
 
-    Paths have the shape (points, landings), the result (points,).
+    Paths have the shape (points, landings).
     """
     settings = SurveySettings.current()
     return np.min(
@@ -305,7 +301,7 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Return which paths wander over the range of the first one, shape (points,)."""
+    """Return which paths spread over the range of the first one, shape (points,)."""
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
         paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share

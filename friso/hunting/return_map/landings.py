@@ -1,5 +1,4 @@
-"""Find the landings of stages: how far from its reference a stage turns on either side,
-swing after swing."""
+"""Find the landings of stages: the distances from the reference at which a stage turns, swing after swing."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().landing_rtol
-"""Relative tolerance of the runs."""
+"""Relative tolerance of the runs that find landings."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +24,8 @@ class Landings(ArrayRows):
     """Runs and their landings, the start first.
 
     `distances` [m], signed, and `times` [s] have the shape (runs, landings), NaN after the last. `count` (runs,) is the
-    number of landings without the start. `ends` (runs, states) are the final states. Runs `rest`, ran `away`, or are
-    `lost` because they failed, shape (runs,).
+    number of landings without the start. `ends` (runs, states) are the final states. Runs come to `rest`, diverge
+    (`away`), or are `lost` because they failed, shape (runs,).
     """
 
     distances: np.ndarray
@@ -38,7 +37,7 @@ class Landings(ArrayRows):
     lost: np.ndarray
 
     def joined(self, more: Landings) -> Landings:
-        """Join these runs and more into one table."""
+        """Join these runs and further ones into one table."""
         room = max(self.distances.shape[1], more.distances.shape[1])
         pairs = ((getattr(part._with(room), entry.name) for part in (self, more)) for entry in fields(self))
         return Landings(*(np.concatenate([*pair]) for pair in pairs))
@@ -54,8 +53,8 @@ class Landings(ArrayRows):
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
     """Follow stages from states, (runs, states), until each has landed `most` times or rests.
 
-    Runs have the relative tolerance `rtol`. A round lasts as long as a stage may take to wind up where it sticks, and
-    to cross its reference.
+    Runs have the relative tolerance `rtol`. A round lasts as long as a sticking stage may take to wind up and to cross
+    its reference.
     """
     orbit_settings = OrbitSettings.current()
     settings = ReturnMapSettings.current()
@@ -104,10 +103,10 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
 
 
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return each run's farthest places [m] on alternating sides, and their times [s].
+    """Return each run's farthest places [m] on alternating sides, their times [s], and their number.
 
-    Both have the shape (runs, landings), the start first; the third result counts them without the start, (runs,).
-    `values` and `times` have the shape (runs, places), NaN for no place.
+    Places and times have the shape (runs, landings), the start first; the number excludes the start, (runs,). `values`
+    and `times` have the shape (runs, places), NaN for no place.
     """
     count = len(values)
     rows = np.arange(count)

@@ -17,7 +17,7 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.stage.controllers import FORCE_LIMIT
 
 NEAR_DISTANCES = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
-"""Distances at which stages are stuck at first, in units of the deflection of the loop by the break-away force."""
+"""Nearer distances at which stages are stuck at first, in deflections of the loop by the break-away force."""
 
 FAR_DISTANCES = np.geomspace(5.0, 300.0, 6)
 """More distances, in units of the deflection of the loop by the break-away force, from which a stage passes its
@@ -29,7 +29,7 @@ force limit begin."""
 
 
 WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
-"""Shares of the way between two starts at which more runs begin, to narrow down a break of the map between them."""
+"""Fractions of the way between two starts at which more runs begin, to narrow down a break of the map."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Mapped:
 
     @property
     def attracts(self) -> np.ndarray:
-        """Return on which maps landings go on for ever, shape (count,)."""
+        """Return on which maps landings continue for ever, shape (count,)."""
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
@@ -96,7 +96,7 @@ class Mapped:
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
         """Continue the runs with these indices from their last landing, for up to `most` landings.
 
-        Returns a new sampling that contains the old and the continued runs.
+        Returns a sampling that contains the old and the continued runs.
         """
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
@@ -107,13 +107,13 @@ class Mapped:
         return before.joined(owners, np.full(len(runs), np.nan), more)
 
     def finer(self) -> Mapped:
-        """Add runs where a map is not resolved yet."""
+        """Add runs in the gaps of maps that are not resolved yet."""
         wanted = [self._wanted(k) for k in range(self.stages.count)]
         owners = np.repeat(np.arange(self.stages.count), [len(starts) for starts in wanted])
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Return starts of more runs of a stage, which should land in gaps between points."""
+        """Return starts of more runs of a stage, whose landings should fall into gaps between points."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -135,7 +135,7 @@ def map_stages(
     rtol: float = RTOL,
     sparse: bool = False,
 ) -> Mapped:
-    """Sample the return maps of stages by runs stuck `near` their reference, and farther.
+    """Sample the return maps of stages by runs stuck `near` their reference, and farther off.
 
     A `sparse` map has every third of the farther starts only.
     """
@@ -154,9 +154,9 @@ def map_stages(
 
 
 def remembered(mapped: Mapped, stage: int) -> str:
-    """Return the state that best explains why runs land equally but return differently.
+    """Return the name of the state that best explains why runs with equal landings continue differently.
 
-    The stage still remembers this state from its past. Returns its name, or "" if no landings show one.
+    The state carries the stage's past. Returns "" if no landings show one.
     """
     settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
@@ -178,10 +178,7 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """Return the landings of runs that stick at first at `starts`, of the stages `owners`.
-
-    Both have the shape (runs,).
-    """
+    """Return the landings of runs of the stages `owners` that stick at first at `starts`, both (runs,)."""
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
 
@@ -189,7 +186,7 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
 def gaps(landing_map: LandingMap) -> np.ndarray:
     """Return the distances at which the map needs a further point, the widest gap first.
 
-    They lie in the middle of gaps that are too wide, and have the sign of their side.
+    Each lies in the middle of a gap that is too wide, with the sign of its side.
     """
     settings = ReturnMapSettings.current()
     places, excess = [], []
@@ -219,10 +216,7 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """Return the runs of the outermost points whose next landing is about as far.
-
-    The map must continue beyond them.
-    """
+    """Return the runs of the outermost points whose next landing is about as far, so that the map must be extended."""
     settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
@@ -236,7 +230,7 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
     """Return starts half-way between some runs and their neighbours.
 
-    `starts` ascend, and `numbers` are the runs that they belong to.
+    `starts` ascend; `numbers` are the numbers of their runs.
     """
     between = []
     for run in runs:
@@ -248,9 +242,9 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts between neighbours of which only one lands, or lands far from the other.
+    """Return starts between neighbours of which only one lands, or whose landings differ widely.
 
-    Starts ascend. An attractor may reach up to such a break of the map. `landings`, (runs,), are the first landings.
+    An attractor may reach up to such a break of the map. Starts ascend. `landings`, (runs,), are the first landings.
     """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing

@@ -9,118 +9,120 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReturnMapSettings(Settings):
-    """Settings of return maps, which predict where a stage sticks next from where it stuck last."""
+    """Settings of return maps, which predict the next sticking distance from the present one."""
 
     hardly_attracting_share: float = setting(0.95, "")
-    """With more of a deviation left per repetition, 51 of 149 sketched attractors did not attract."""
+    """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. With more, 51 of
+    149 did not attract."""
 
     least_arriving_points: int = setting(4, "")
-    """Attractors to which fewer points of a map come are artefacts of its gaps."""
+    """Fewest points of a map that must lead to an attractor. Fewer come from gaps of the map."""
 
     attractor_tries: int = setting(4, "")
-    """Each try adds landings where the map leads; after four it does not change."""
+    """Tries to close an attractor. Each adds landings where the map leads; after four the map does not change."""
 
     followed_repetitions: int = setting(3, "")
-    """Fewer repetitions do not show that an attractor of the map is one of the stage."""
+    """Repetitions for which a run follows an attractor of the map before it counts as one of the stage."""
 
     simple_closing_share: float = setting(0.05, "")
-    """Landings of the simplest cycles that differ by less are near enough to close an orbit."""
+    """Largest difference between landings of the simplest cycles from which an orbit can be closed."""
 
     closing_share: float = setting(0.01, "")
-    """Cycles of several landings need better guesses."""
+    """Largest difference between landings of longer cycles, which need better guesses, for an orbit to be closed."""
 
     same_orbit_distance_share: float = setting(0.05, "")
-    """An orbit whose mean distance differs by more is another than that of the map."""
+    """Largest difference in mean distance between an orbit and the attractor of the map."""
 
     map_scatter_share: float = setting(0.05, "")
-    """Landings that scatter by more about the prediction of their neighbours are no map: the stage remembers more."""
+    """Largest scatter of landings about the prediction of their neighbours. With more, the stage remembers more than
+    distance."""
 
     confirmed_landings: int = setting(12, "landings")
-    """A map is confirmed by runs that land this often where it predicts."""
+    """Landings for which runs are compared with the map's predictions."""
 
     first_landings: int = setting(3, "landings")
-    """After these a stage has forgotten how its motion began."""
+    """Landings after which a stage has forgotten how its motion began."""
 
     more_landings: int = setting(3, "landings")
-    """More at once would be wasted on runs that the map already decides."""
+    """Landings added at a time to runs that the map does not decide yet."""
 
     fate_rounds: int = setting(8, "")
-    """A run that the map does not decide by then stays unknown."""
+    """Rounds after which a run that the map does not decide stays unknown."""
 
     unsure_landing_share: float = setting(0.02, "")
-    """A landing that is off by more shows that the stage still remembers its start."""
+    """Error of a landing beyond which the stage still remembers its start."""
 
     break_jump_log: float = setting(0.5, "")
-    """Neighbouring returns that differ by more are on two sides of a break of the map."""
+    """Difference in log distance beyond which neighbouring returns lie on two sides of a break of the map."""
 
     break_steepness: float = setting(3.0, "")
-    """A map that is steeper between two points breaks off there."""
+    """Slope between two points beyond which the map breaks off."""
 
     map_iterations: int = setting(200, "landings")
-    """Most starts have reached an attractor by then."""
+    """Iterations of the map in which most starts reach an attractor."""
 
     iteration_doublings: int = setting(4, "")
-    """Maps that still leave a cycle slowly are followed for sixteen times as long."""
+    """Doublings of the iterations for maps that leave a cycle slowly."""
 
     checked_landings: int = setting(10, "landings")
-    """A number with many divisors: cycles of 1, 2, 5 and 10 landings are seen."""
+    """Last landings examined for repetition. Ten has many divisors, so cycles of 1, 2, 5 and 10 landings are seen."""
 
     exact_repetition_share: float = setting(1e-9, "")
-    """A repetition this close is no slow approach."""
+    """Error of a repetition that is too small for a slow approach."""
 
     arrived_share: float = setting(1e-6, "")
-    """Landings that change by less have come to a cycle."""
+    """Change of landings below which they have reached a cycle."""
 
     same_landing_share: float = setting(2e-3, "")
-    """Landings a cycle apart that differ by more are different ones."""
+    """Difference beyond which landings one cycle apart count as different."""
 
     same_attractor_share: float = setting(0.02, "")
-    """Landings of one attractor from two starts differ by less."""
+    """Largest difference between landings of one attractor reached from two starts."""
 
     farthest_sticking: float = setting(3.0, "deflections at break-away")
-    """From farther off a stage passes its reference without sticking."""
+    """Farthest distance of sticking. From farther off a stage passes its reference without sticking."""
 
     scatter_range_log: float = setting(0.05, "")
-    """Scatter is measured between points within this distance; over more, the map itself changes."""
+    """Distance between points over which scatter is measured. Over more, the map itself changes."""
 
     ringing_share: float = setting(0.05, "of the distance")
-    """A stage that has landed rings by less."""
+    """Largest ringing of a stage that has landed."""
 
     standing_speed: float = setting(1e-3, "distances times natural frequency")
-    """A slower stage has landed; a faster one is still on its way."""
+    """Speed below which a stage has landed."""
 
     resting_move_share: float = setting(0.01, "of the distance")
-    """A stage that moves by less while it could have broken away rests or creeps home."""
+    """Largest move of a stage that rests or creeps home while it could have broken away."""
 
     round_step_limit: int = setting(20_000, "steps")
-    """A swing takes a thousand; a limiter that chatters would take millions."""
+    """Most steps of a round. A swing takes a thousand; a limiter that chatters would take millions."""
 
     flight_time: float = setting(30.0, "1/natural frequencies")
-    """A crossing that takes longer goes on in the next round."""
+    """Longest crossing in a round. A slower one continues in the next round."""
 
     extra_rounds: int = setting(10, "")
-    """A stage that stops short, creeps, or is driven at its force limit needs several rounds for a swing."""
+    """Further rounds for a stage that stops short, creeps, or is driven at its force limit."""
 
     run_landings: int = setting(3, "landings")
-    """After the first landing, the next ones no longer depend on how the run began."""
+    """Landings of a run. After the first one, the next ones no longer depend on the start."""
 
     coarse_gap_log: float = setting(0.15, "")
-    """Wider gaps between points hide folds of the map."""
+    """Widest gap between points away from the diagonal. Wider ones hide folds of the map."""
 
     fine_gap_log: float = setting(0.01, "")
-    """Near the diagonal the map decides what attracts; finer gaps take more runs."""
+    """Widest gap between points near the diagonal, where the map decides stability. Finer gaps take more runs."""
 
     diagonal_gain_log: float = setting(0.1, "")
-    """The map is near its diagonal where swings grow or shrink by less than a tenth."""
+    """Range about the diagonal in which gaps must be fine: swings grow or shrink by less than a tenth."""
 
     outermost_loss_log: float = setting(0.3, "")
-    """Outermost points that lose more lead inward, so no attractor lies beyond them."""
+    """Loss of the outermost points beyond which the map leads inward, so that no attractor lies farther off."""
 
     break_width_log: float = setting(0.02, "")
-    """Breaks between two starts are narrowed down to this width; no attractor was met in narrower ranges."""
+    """Width to which a break between two starts is narrowed down."""
 
     runs_added: int = setting(12, "")
-    """More runs at once for one stage keep all others waiting."""
+    """Most runs added at once for one stage, for which all others wait."""
 
     refining_rounds: int = setting(2, "")
-    """After two rounds the map changes only where a search decides anyway."""
+    """Rounds of refinement. Afterwards the map changes only where a search decides anyway."""

@@ -1,4 +1,4 @@
-"""Motions that begin with more friction than the static friction of a fit, which leaves these moments out."""
+"""Doubt: motions begin with more friction than the fitted static friction, because the fit leaves these moments out."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ from friso.identification.settings import DoubtSettings
 from friso.intervals import COVERAGE
 
 MEDIAN = 1.25
-"""Deviation of a median over that of a mean, of normal errors: sqrt(pi / 2), to two digits."""
+"""Standard deviation of a median over that of a mean, of normal errors: sqrt(pi / 2), to two digits."""
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Compare the friction at which motions begin with the fitted static friction.
 
-    A stage that follows a log shows friction while it moves, and the Stribeck curve leads from there to standstill.
-    For a body that sticks by another law, or by a curve with another exponent, the curve leads to a static friction
-    that is too low.
+    A stage that follows a log shows friction while it moves, and the Stribeck curve extrapolates to standstill. For a
+    body that sticks by another law, or with another exponent, the extrapolated static friction is too low.
     """
     if is_free(case.flat) or (case.fit.problem.closed and case.fit.explains(case.quality.noise)):
         return
@@ -57,7 +56,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return how far friction may exceed static friction [N] at up to these speeds [m/s], (n,)."""
+    """Return how far friction may exceed static friction [N] up to the given speeds [m/s], (n,)."""
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)

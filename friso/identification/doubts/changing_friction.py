@@ -1,4 +1,4 @@
-"""Friction or a constant force that changes while the record is taken: a machine that warms up, a force that drifts."""
+"""Doubt: friction or a constant force changes during the record, by warming up or by drift."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from friso.identification.settings import DoubtSettings
 
 @dataclass(frozen=True)
 class RecordDrift:
-    """How far fitted numbers move, (free,), if friction and a constant force may change.
+    """Shifts of fitted numbers, (free,), if friction and a constant force may change.
 
-    `friction` and `constant` [N] are the changes over the record; their reaches [N] are how far they deviate from
-    their means.
+    `friction` and `constant` [N] are the changes over the record; their reaches [N] are the deviations from their
+    means.
     """
 
     moved: np.ndarray
@@ -35,7 +35,7 @@ class RecordDrift:
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit changes of friction and of the constant force to what is left of the force."""
+    """Fit changes of friction and of the constant force to the residual force."""
     inverse, quality = case.inverse, case.quality
     changes = None
     if not quality.failed:
@@ -59,9 +59,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
-    """Return what changes during a record, from its smooth `velocity` [m/s], shape (n,).
+    """Return the changes during a record, from its smooth `velocity` [m/s], shape (n,).
 
-    The changes are fitted together with the parameters, starting from the fit. None if nothing clearly changes.
+    The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes.
     """
     if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
         return None
@@ -86,10 +86,7 @@ def changing_forces(
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:
-    """Return what changes during the record of an inverse model.
-
-    The model has one friction for both directions.
-    """
+    """Return the changes during the record of an inverse model with one friction for both directions."""
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     bends = _bends(share, counted)
@@ -98,7 +95,7 @@ def changes_beside(inverse: InverseModel) -> RecordDrift | None:
 
 
 def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
-    """Return two shapes of change along a record, less their means, at shares of its time, (n,).
+    """Return two shapes of change along a record, less their means, at fractions of its time, (n,).
 
     One rises to 1 in the middle and falls again; the other rises to 1 from the middle to the end.
     """
@@ -116,10 +113,7 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
-    """Return the fit with deviations widened for changes of friction and of the constant force.
-
-    They reach as far as the changes would move the fit, and over the change itself.
-    """
+    """Return the fit with deviations that include the changes, and the shifts of the fit, of both forces."""
     further = np.abs(changes.moved)
     for i, number in enumerate(fit.free):
         name = fit.problem.parameters[number].name
@@ -131,10 +125,7 @@ def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
 
 
 def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
-    """Return the inverse model with intervals widened for changes during the record.
-
-    They reach as far as the changes would move it, and over the change itself.
-    """
+    """Return the inverse model with intervals that include changes during the record, and the shifts by them."""
     over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
     answers = []
     for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):

@@ -1,4 +1,4 @@
-"""A controller whose gains change during the record: a schedule over speed or place, or a switch at an instant."""
+"""Doubt: the controller's gains change during the record, by speed, by place, or at an instant."""
 
 from __future__ import annotations
 
@@ -16,9 +16,8 @@ from friso.identification.settings import DoubtSettings
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Fit the force by error, its derivatives and integral, over the whole record and over two parts of it.
 
-    The parts are those before and after an instant, at low and high speeds of the reference, and on either side of a
-    place. One linear controller has the same gains in all of them, whatever the machine does. Where clocks drift apart
-    the law changes as well, but not its size.
+    The parts are divided by an instant, by speed of the reference, or by place. One linear controller has equal gains
+    in all parts, whatever the machine does. With drifting clocks the law changes as well, but not its size.
     """
     settings = DoubtSettings.current()
     if "reference" not in case.log:
@@ -52,11 +51,11 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Return the signals of a linear controller, the stretch of each row, and what gains may depend on, by row.
+    """Return signals of a linear controller, the stretch of each row, and the variables on which gains may depend.
 
     The signals, shape (rows, 9), are the error, its derivatives and integral, the motion of the reference and its
-    direction, and last the force [N], all through the same filter. Rows with a force at its limits are left out; they
-    part the stretches.
+    direction, and last the force [N], all through one filter. Rows with a force at its limits are left out; they
+    separate the stretches. The variables have one value per row.
     """
     settings, log, part = DoubtSettings.current(), case.log, case.log.longest
     step, cutoff = log.sample_time, settings.bandwidths_of_a_controller * case.inverse.bandwidth
@@ -100,7 +99,7 @@ def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:
-    """Return a force over the `usual` one, each of shape (rows,) [N]; 1 where it is not like that at any ratio."""
+    """Return the ratio of a force to the `usual` one, each of shape (rows,) [N]; 1 if they are not proportional."""
     likeness = float(usual @ force) / (float(np.linalg.norm(usual) * np.linalg.norm(force)) or 1.0)
     if likeness < DoubtSettings.current().likeness_of_a_law:
         return 1.0
@@ -114,4 +113,4 @@ DOUBT = Doubt(
     "reported",
     "a record with fixed gains",
 )
-"""Without a reference the error is not known. A stage that follows the log needs no controller: its values hold."""
+"""Without a reference the error is not known; a stage that follows the log then needs no controller."""

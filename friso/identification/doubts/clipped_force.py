@@ -1,4 +1,4 @@
-"""A force whose channel clips: many samples lie at its extremes."""
+"""Doubt: the force channel clips, with many samples at its extremes."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from friso.quantities import percent
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Count the samples at the largest and the smallest force.
 
-    A force that clips is smaller than the true one just where inertia is large, and friction at low speed stands for
-    the rest.
+    A clipped force is too small just where inertia is large, which distorts mass and friction.
     """
     share = checks.clipped_share(case.log["force"])
     if share > LogSettings.current().share_of_clipped_samples:

@@ -1,4 +1,4 @@
-"""A force that differs along the way: cogging of a motor, a cable, a slope; it passes for friction and for mass."""
+"""Doubt: a force that varies along the way, such as cogging, a cable or a slope, passes for friction and mass."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name a force that differs along the way, and its pitch, if it explains most of the rest."""
+    """Name a force that varies along the way, with its pitch, if it explains most of the residual."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "cogging" or case.quality.failed or case.quality.rejected:
         return
@@ -31,7 +31,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield a force at each of some places along the way, then one with the best-fitting pitch."""
+    """Yield forces at several places along the way, then one with the best-fitting pitch."""
     settings, problem = DoubtSettings.current(), case.fit.problem
     position, counted = case.log["position"][case.log.longest], problem.counted > 0
     travel = float(np.ptp(position))
@@ -47,10 +47,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def places_along(position: np.ndarray) -> list[np.ndarray]:
-    """Return columns that distinguish places along the way [m], each (n,), less their means.
-
-    The first place has no column.
-    """
+    """Return indicator columns of places along the way [m], each (n,), less their means; the first place has none."""
     nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
     return [column - column.mean() for column in near[1:]]
@@ -63,7 +60,7 @@ def _waves(position: np.ndarray, pitch: float) -> list[np.ndarray]:
 
 
 def _explained_by(position: np.ndarray, pitch: float, rest: np.ndarray) -> float:
-    """Return the power [N^2] of a residual force, (n,), that a force of a pitch [m] explains.
+    """Return the power [N^2] of a residual force, (n,), that a force with a pitch [m] explains.
 
     The constant part does not count.
     """

@@ -1,4 +1,4 @@
-"""A constant force greater than the friction: gravity, or an offset of the channel."""
+"""Doubt: a constant force exceeds the friction, by gravity or by an offset of the channel."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Name a constant force larger than Coulomb friction and not small against the whole force.
-
-    Gravity on an axis that is not level causes it, or an offset of the force's channel.
-    """
+    """Name a constant force that is larger than Coulomb friction and not small against the whole force."""
     inverse = case.inverse
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
     share = DoubtSettings.current().force_share_of_a_constant_force

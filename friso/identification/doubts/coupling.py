@@ -1,4 +1,4 @@
-"""A coupling between force and position: a load that moves on a spring passes for more or less mass."""
+"""Doubt: a compliant coupling between force and position makes the mass too large or too small."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from friso.identification.settings import DoubtSettings
 from friso.quantities import percent
 
 IMITATED = "what the model lacks would pass for it"
-"""Why bristles are not taken from a record that the model does not describe to its noise."""
+"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Look for a load on a coupling: a force like the second derivative of the acceleration.
+    """Look for a load on a coupling: a force proportional to the second derivative of the acceleration.
 
     A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
-    motion that goes as exp(s t): well below w, its force lacks m / w^2 times the second derivative of the
-    acceleration. Where the position of the load is measured, the force that moves a mass M before the coupling is
-    greater by M / w^2 times that derivative.
+    motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If the
+    position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times that
+    derivative.
     """
     fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
     if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
@@ -45,7 +45,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def coupling_force(case: FittedCase) -> np.ndarray | None:
     """Return the force of a coupling [N], (n,), scaled to the standard deviation of the inertia.
 
-    None if no mass is fitted, or the stage does not move.
+    Returns None if no mass is fitted, or the stage does not move.
     """
     fit, step = case.fit, case.log.sample_time
     if MASS not in [fit.problem.parameters[number].name for number in fit.free]:
@@ -58,7 +58,7 @@ def coupling_force(case: FittedCase) -> np.ndarray | None:
 
 
 def _sentence(share: float) -> str:
-    """Say which way a coupling moves the mass, by a share of it."""
+    """Write the sentence on a coupling that changes the mass by a relative amount."""
     where, way = (
         ("a part of the load moved on a coupling behind the measured position", "smaller")
         if share > 0

@@ -1,4 +1,4 @@
-"""A delay between force and motion that is too short to show in the inverse model: it passes for damping."""
+"""Doubt: a delay between force and motion, too short to show in the inverse model, passes for damping."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Look for a delay of the force: a force like the derivative of the logged force.
+    """Look for a delay of the force, by the derivative of the logged force.
 
     A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
-    pass it on as damping, by their stiffness times the delay, and inertia as viscous friction. It is tried if the
-    stage was held to the log.
+    turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. It is tried if the
+    stage follows the log.
     """
     fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
     force = delay_force(case)
@@ -38,17 +38,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the derivative of the log's force, where the stage was held to the log."""
+    """Yield the derivative of the log's force, if the stage follows the log."""
     force = delay_force(case)
     if not case.fit.problem.closed and force.any():
         yield TriedForces([force], [DoubtSettings.current().samples_of_a_tried_delay * case.log.sample_time])
 
 
 def delay_force(case: FittedCase) -> np.ndarray:
-    """Return the derivative of the logged force [N/s], shape (n,), without noise.
-
-    A delay multiplies it.
-    """
+    """Return the derivative of the logged force [N/s], shape (n,), without noise."""
     cutoff = DoubtSettings.current().bandwidths_of_a_delayed_force * case.inverse.bandwidth
     force = low_pass(case.log["force"][case.log.longest], case.log.sample_time, cutoff)
     return np.gradient(force, case.log.sample_time)

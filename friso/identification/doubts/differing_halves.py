@@ -1,4 +1,4 @@
-"""Mass or friction that differs between the halves of a record: a load that changes, friction that rises."""
+"""Doubt: mass or friction differs between the halves of a record."""
 
 from __future__ import annotations
 
@@ -14,15 +14,12 @@ from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
 WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
-"""What the inverse model identifies, in sentences."""
+"""Words for the quantities of the inverse model in sentences."""
 
 
 @dataclass(frozen=True)
 class Half:
-    """A quantity of the inverse model with its values in both halves of a record.
-
-    The interval holds both.
-    """
+    """A quantity of the inverse model with its values in both halves of a record, and an interval that spans both."""
 
     name: str
     first: float
@@ -42,10 +39,7 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def halves(inverse: InverseModel) -> list[Half]:
-    """List mass, viscous and Coulomb friction that differ between the halves of a record.
-
-    The differences exceed the spreads of both halves.
-    """
+    """List mass, viscous and Coulomb friction that differ between the halves of a record beyond both spreads."""
     fits = []
     for part in np.array_split(np.arange(len(inverse.measured)), 2):
         columns, force = inverse.columns[part], inverse.measured[part]

@@ -1,4 +1,4 @@
-"""A delay between force and motion that grows or shrinks along the record: two clocks, a buffer that fills."""
+"""Doubt: a delay between force and motion grows or shrinks along the record, with two clocks or a buffer that fills."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the derivative of the force, and its product with a line over the record.
+    """Yield the derivative of the force, and its product with a ramp over the record.
 
-    They are yielded where a changing delay clearly explains more.
+    They are yielded only if a changing delay explains more than a constant one.
     """
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():

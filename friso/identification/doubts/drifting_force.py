@@ -1,4 +1,4 @@
-"""A force that drifts along the record."""
+"""Doubt: the force drifts along the record."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from friso.identification.inverse_model import inverse_model
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit the inverse model with one more column: time.
+    """Fit the inverse model with time as a further column.
 
-    The force of a channel that warms up, or of a process, may drift while nothing of the machine changes.
+    The force of a channel that warms up, or of a process, may drift while the machine does not change.
     """
     log = case.log
     with suppress(InputError):

@@ -1,4 +1,4 @@
-"""A force that depends on the position: a spring, a cable, cogging, friction that differs by place."""
+"""Doubt: a force depends on the position, such as a spring, a cable or cogging."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit the inverse model with a force of its own at each of some places along the way."""
+    """Fit the inverse model with a separate force at each of several places along the way."""
     places = _places(case.log["position"], len(case.inverse.measured))
     with suppress(InputError):
         if places:
@@ -25,10 +25,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Return columns for a least-squares fit of a force that depends on the place, each (n,).
-
-    Each column belongs to one place along the way; the first place has none.
-    """
+    """Return indicator columns of places along the way, each (n,); the first place has none."""
     settings = DoubtSettings.current()
     count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)
     if count < 3:

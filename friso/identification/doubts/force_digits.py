@@ -1,4 +1,4 @@
-"""A force in digits that are coarse beside the friction."""
+"""Doubt: the resolution of the force is coarse compared with the friction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from friso.quantities import percent
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Compare the resolution of the force with Coulomb friction.
 
-    It is the step of which all steps of the force are multiples, in a log where most steps are zero.
+    The resolution is the step of which all steps of the force are multiples, in a log where most steps are zero.
     """
     settings = DoubtSettings.current()
     steps = np.abs(np.diff(case.log["force"][case.log.longest]))

@@ -1,4 +1,4 @@
-"""Friction that differs between forward and backward motion by more than its level."""
+"""Doubt: friction differs between forward and backward motion by more than its level."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from friso.intervals import COVERAGE
 from friso.progress import between
 
 EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
-"""What one direction alone does not tell from friction."""
+"""Keys that motion in one direction cannot separate from friction."""
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit forward and backward motion separately, if the fit to both does not explain them.
+    """Fit forward and backward motion separately, if the common fit does not explain both.
 
-    The model has one static friction, one Stribeck velocity and one set of bristles for both. If these differ, the fit
-    to both need not lie between them. Deviations are widened to reach both results, beyond chance. If the model lacks
-    something, the search starts everywhere, since the fit to both may be an optimum that neither direction has.
+    The model has one static friction, one Stribeck velocity and one set of bristles for both directions. If these
+    differ, the common fit need not lie between them, so deviations are widened to reach both results, beyond chance. If
+    the model lacks something, the search starts everywhere, because the common fit may be an optimum of neither
+    direction.
     """
     both, settings = case.fit, DoubtSettings.current()
     if both.explains(case.quality.noise):

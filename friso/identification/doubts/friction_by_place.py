@@ -1,4 +1,4 @@
-"""Friction that differs along the way: a worn stretch, a preload that varies, a dry place."""
+"""Doubt: friction differs along the way, by a worn stretch, a varying preload or a dry place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name how much friction differs along the way, if that explains most of what is left."""
+    """Name by how much friction differs along the way, if that explains most of the residual."""
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "friction-by-place" or case.quality.failed or case.quality.rejected:
         return
@@ -35,7 +35,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield friction of its own at each of some places along the way."""
+    """Yield a separate friction at each of several places along the way."""
     settings = DoubtSettings.current()
     if "friction.coulomb" not in [parameter.name for parameter in case.fit.problem.parameters]:
         return
@@ -53,4 +53,4 @@ DOUBT = Doubt(
     after=("friction-by-direction",),
     forces=forces,
 )
-"""Places are the same as of a force along the way: what turns with the direction is friction."""
+"""The places are those of a force along the way; a part that changes sign with the direction is friction."""

@@ -1,4 +1,4 @@
-"""Gaps in a record that leave little of it to fit."""
+"""Doubt: gaps leave little of the record to fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the longest stretch without a gap, which alone is fitted, with the whole record.
+    """Compare the longest stretch without a gap, the only one that is fitted, with the whole record.
 
     Derivatives and filters do not reach across a gap.
     """

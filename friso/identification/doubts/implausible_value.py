@@ -1,4 +1,4 @@
-"""An identified value that no positioning stage has."""
+"""Doubt: an identified value is implausible for a positioning stage."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from friso.stage import Stage, plausible
 
 
 def find(case: tuple[Stage, Sequence[Estimate]]) -> Iterator[RaisedDoubt]:
-    """Look for identified keys of a stage among those whose values are implausible."""
+    """List identified keys of a stage whose values are implausible."""
     stage, estimates = case
     keys = [estimate.name for estimate in estimates if estimate.determined]
     for sentence in plausible.implausible_values(stage):

@@ -1,4 +1,4 @@
-"""Estimates and intervals with values that their keys cannot have, such as a negative friction."""
+"""Doubt: an estimate or its interval contains values that the key cannot have, such as a negative friction."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from friso.quantities import non_negative, positive
 from friso.stage import numeric_keys
 
 NOT_ABOVE_ZERO = "its interval reaches down to zero"
-"""Why there is no value of what cannot be zero."""
+"""Reason why a quantity that cannot be zero has no value."""
 
 NEGATIVE = "it comes out negative, which it cannot be"
-"""Why there is no value of what its interval says is negative."""
+"""Reason why a quantity whose whole interval is negative has no value."""
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Cut intervals at 0 where a key allows no less, and refuse what cannot be.
+    """Cut intervals at 0 for keys that allow no less, and refuse impossible values.
 
-    What is negative by its whole interval is refused; what cannot be 0 is bounded from above where its interval holds
+    An estimate with a negative interval is refused; one that cannot be 0 is bounded from above if its interval contains
     0.
     """
     bounds = {key: declared.bound for key, declared in numeric_keys(case.flat).items()}

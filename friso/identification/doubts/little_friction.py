@@ -1,4 +1,4 @@
-"""Coulomb friction that is none, or as no bearing can have it."""
+"""Doubt: Coulomb friction is zero, negative or impossibly small."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
-    """Compare the Coulomb friction of the inverse model with nothing, and with the force at all.
+    """Compare the Coulomb friction of the inverse model with zero, and with the whole force.
 
-    Where a log moves in one direction only, friction and a constant force cannot be told apart, and may cancel.
+    In a log with one direction of motion, friction and a constant force cannot be separated, and may cancel.
     """
     value, unit = case.inverse.value("coulomb"), case.unit
     least = DoubtSettings.current().force_share_of_no_friction * float(np.std(case.inverse.measured))
@@ -22,7 +22,7 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def _sentence(case: ValueCase, value: float, least: float) -> str:
-    """What little friction, or a negative one, may come from."""
+    """Write the sentence on possible causes of little, or negative, friction."""
     one, unit = case.inverse.estimate("coulomb"), case.unit
     if not one.determined:
         says, does = ("which helps the motion", "exceeds") if value <= -least else ("next to nothing", "may hide")

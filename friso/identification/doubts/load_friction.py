@@ -1,4 +1,4 @@
-"""Friction that grows with the force of the motor, as that of worm gears, belts and preloaded screws does."""
+"""Doubt: friction grows with the force of the motor, as in worm gears, belts and preloaded screws."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Look for friction in proportion to the motor's force, beside the friction of the model.
+    """Look for friction in proportion to the motor's force.
 
-    Such friction makes a mass seem heavier while the motor drives it than while the motor brakes it. The model has one
-    mass and one Coulomb friction for both: a machine of 3 kg and 5 N, with a tenth of the force as friction, came out
-    at 3.13 to 3.36 kg and 5.44 to 5.60 N, without a doubt. It is named if it explains much of what the fit leaves, and
-    more than a coupling, a delay, or friction that changes with time would.
+    It makes a mass seem heavier while the motor drives it than while the motor brakes it, but the model has one mass
+    and one Coulomb friction for both. A machine of 3 kg and 5 N, with a tenth of the force as friction, came out at
+    3.13 to 3.36 kg and 5.44 to 5.60 N without a warning. The effect is named if it explains much of the residual, and
+    more than a coupling, a delay, or friction that changes with time.
     """
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "load-friction":
@@ -36,7 +36,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield a force against the motion in proportion to the motor's force."""
+    """Yield a force against the motion, in proportion to the motor's force."""
     settings = DoubtSettings.current()
     force = case.log["force"][case.log.longest]
     yield TriedForces([-np.abs(force) * way_of(case)], [settings.share_of_a_tried_load])

@@ -1,4 +1,4 @@
-"""A mass whose inertia is lost in what the model does not explain."""
+"""Doubt: the inertia of a mass is smaller than the residual."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Compare the inertia of the masses with what the model leaves unexplained, noise apart.
+    """Compare the inertia of the masses with the residual beyond noise.
 
-    Any of what is left may pass for inertia: a mass whose inertia is less is not shown. What a fit leaves is least like
-    inertia where that is large: a mass is as uncertain as the square of their ratio at least (our choice).
+    Any part of the residual may pass for inertia, so a mass with less inertia is not determined. Its relative
+    uncertainty is at least the square of the ratio of both (friso's choice).
     """
     masses = {key: one for key, one in case.determined.items() if key in ("masses.cart", "masses.stage")}
     inertia = sum(mass.value for mass in masses.values()) * float(np.sqrt(np.mean(case.acceleration**2)))

@@ -1,4 +1,4 @@
-"""A feedforward of the drive that is not part of the logged force."""
+"""Doubt: the logged force lacks a feedforward of the drive."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
 ACCELERATION, DIRECTION = "reference acceleration", "reference direction"
-"""Names of further columns of the inverse model."""
+"""Names of the additional columns of the inverse model."""
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for feedforward missing from the logged force, by the reference's acceleration.
+    """Look for feedforward missing from the logged force, by acceleration and direction of the reference.
 
-    Acceleration and direction of the reference are fitted; they must add something while the stage is fast.
+    Both must improve the fit while the stage is fast.
     """
     fed = fed_forward(case)
     if fed is None or not lacks_when_fast(case.inverse, fed[1]):
@@ -41,7 +41,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
     """Fit the inverse model with feedforward of the reference's acceleration and direction.
 
-    Also returns the part [N] that goes with the acceleration, shape (rows,). Returns None without a reference, or if
+    Also returns the part [N] in proportion to the acceleration, shape (rows,). Returns None without a reference, or if
     nothing is missing.
     """
     log, inverse = case.log, case.inverse
@@ -63,9 +63,9 @@ def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
 def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
     """Tell whether feedforward [N], (rows,), is missing from the force while the stage is fast.
 
-    It has to be missing in both halves of these rows. If a servo follows well, the reference's acceleration differs
-    from the measured one by the effects of friction at low speed and of sticking. It can stand in for these where the
-    inverse model lacks them, but not where the stage slides.
+    It must be missing in both halves of these rows. In a servo that follows well, reference and measured acceleration
+    differ by friction at low speed and by sticking, which feedforward could imitate where the inverse model lacks them,
+    but not where the stage slides.
     """
     settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])
     fast = np.flatnonzero(speed > settings.speed_share_of_a_fast_stage * speed.max())
@@ -82,7 +82,7 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
 
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
-    """Return acceleration [m/s^2] and direction of the reference, (n,) each; {} without one."""
+    """Return acceleration [m/s^2] and direction of the reference, (n,) each; {} without a reference."""
     settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}

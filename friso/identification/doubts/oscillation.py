@@ -1,4 +1,4 @@
-"""An oscillation of the residual at one frequency: a mode in the band, or cogging at constant speed."""
+"""Doubt: the residual oscillates at one frequency, by a mode in the band or by cogging at constant speed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from friso.quantities import percent
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for a peak of the residual's spectrum that holds most of its power.
+    """Look for a spectral peak that holds most of the residual's power.
 
-    A mode of the structure in the band swings at one frequency, and so does a force that repeats along the way of
-    constant speed.
+    A structural mode oscillates at one frequency, and so does a force that repeats along the way at constant speed.
     """
     inverse, settings = case.inverse, DoubtSettings.current()
     left = inverse.measured - inverse.fitted

@@ -1,4 +1,4 @@
-"""A feedforward that may be missing from the logged force, where the log does not tell."""
+"""Doubt: a feedforward may be missing from the logged force, but the log does not decide."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Give the mass in case the logged force leaves out a feedforward.
+    """State the mass in case the logged force leaves out a feedforward.
 
-    The reference's acceleration explains much more of the force, but not clearly so while the stage is fast, so that
-    the log does not tell.
+    The reference's acceleration explains much more of the force, but not clearly so while the stage is fast.
     """
     fed, share = missing_feedforward.fed_forward(case), DoubtSettings.current().error_share_of_a_cause
     if fed is None or fed[0].error >= share * case.inverse.error:

@@ -1,4 +1,4 @@
-"""Play between motor and load: a part of the mass is loose by a gap, and passes for soft bristles."""
+"""Doubt: play between motor and load passes for soft bristles."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the width of the play where a load that is loose by it explains most of what the fit leaves.
+    """Name the width of the play if a load with play explains most of the residual.
 
-    Where the widest play that is tried explains most, something slower than a play does: it has no name then, and the
-    intervals allow for it.
+    If the widest play that is tried explains most, something slower is the cause: it is not named, and the intervals
+    allow for it.
     """
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "play" or case.quality.failed or case.quality.rejected:
@@ -44,8 +44,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that the motor saves while the load is loose, for each width of play.
 
-    All of the mass is taken as load. The load carries the friction or not: with friction it slows down while it is
-    loose.
+    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
     names = [parameter.name for parameter in fit.problem.parameters]
@@ -72,9 +71,9 @@ def loose_loads(
 ) -> np.ndarray:
     """Return velocities [m/s] of loads that a motor drives through play, shape (loads, n).
 
-    The motor's `position` [m] and `velocity` have the shape (n,), every `step` [s]. Each load, of shape (loads,), has a
-    width of play [m] and is slowed down by `slowings` [m/s^2] where it is loose; where it meets a flank it goes on with
-    the motor, without a bounce.
+    The motor's `position` [m] and `velocity` have the shape (n,), sampled every `step` [s]. Each load, (loads,), has a
+    width of play [m] and is slowed down by `slowings` [m/s^2] while loose; at a flank it continues with the motor,
+    without a bounce.
     """
     half, less = widths / 2, slowings * step
     place, speed = np.full(len(widths), position[0]), np.full(len(widths), velocity[0])

@@ -1,4 +1,4 @@
-"""A position in digits that are coarse beside its travel."""
+"""Doubt: the resolution of the position is coarse compared with its travel."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Count how many of its smallest steps the position travels.
+    """Compare the travel with the smallest step of the position.
 
-    Coarse digits make accelerations of noise, and hide how bristles bend.
+    A coarse resolution turns into noise of the acceleration, and hides the deflection of bristles.
     """
     position = case.log["position"][case.log.longest]
     steps = np.abs(np.diff(position))

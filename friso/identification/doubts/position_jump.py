@@ -1,4 +1,4 @@
-"""A position that jumps, as after homing or a reset of the counter."""
+"""Doubt: the position jumps, as after homing or a reset of the counter."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from friso.identification.logs.checks import jumps
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for a step between two samples that no motion makes.
+    """Look for a step between two samples that no motion makes, many times larger than nearly all others.
 
-    Such a step is many times larger than all steps but a few. The inverse model turns it into a force that no machine
-    has.
+    The inverse model turns it into an impossible force.
     """
     log = case.log
     size, sample = jumps(log["position"][log.longest])

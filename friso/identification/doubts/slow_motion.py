@@ -1,4 +1,7 @@
-"""A record so slow that the Stribeck effect acts throughout: what friction is at higher speeds is left open."""
+"""Doubt: the record is so slow that the Stribeck effect acts throughout.
+
+Friction at higher speeds is then open.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,15 @@ from friso.identification.output_error.parameters import stribeck_up_to
 from friso.identification.settings import DoubtSettings
 
 SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
-"""What friction is once the Stribeck effect has died away."""
+"""Keys of friction beyond the Stribeck effect."""
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Withhold friction of a record that is too slow for the Stribeck effect to die away.
+    """Refuse friction of a record that is too slow for the Stribeck effect to decay.
 
-    A slower record shows the sum of the effect and Coulomb friction; of this sum Coulomb friction is at least a
-    quarter. If the Stribeck velocity is not shown it may be the highest of any bearing. If it is shown, the effect is
-    small at twice that velocity, and hardly depends on the exponent assumed.
+    It shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. If the
+    Stribeck velocity is not determined, it may be the highest of any bearing. If it is, the effect is small at twice
+    that velocity, and hardly depends on the assumed exponent.
     """
     if "friction.stribeck_velocity" not in case.flat:
         return

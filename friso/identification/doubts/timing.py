@@ -1,4 +1,4 @@
-"""A delay between force and motion, or an average over one of them: a filter, a sensor, a slow channel."""
+"""Doubt: a delay between force and motion, or an average over one of both, by a filter or a slow channel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.identification.settings import DoubtSettings
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Search for the shift of the force, and the average of force or motion, that fit best.
 
-    Shifts and averages double from one to the next, and the best of them is refined once to both sides.
+    Shifts and averages are doubled in turn, and the best is refined once to both sides.
     """
     log, settings = case.log, DoubtSettings.current()
     fits: dict[tuple[int, int], InverseModel] = {(0, 1): case.inverse}
@@ -51,9 +51,9 @@ def _doubling(most: float) -> list[int]:
 
 
 def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
-    """Fit the inverse model with the force `lag` samples later and the motion averaged.
+    """Fit the inverse model with the force `lag` samples later and the motion averaged over `width` samples.
 
-    The average is over `width` samples; a negative `width` averages the force instead.
+    A negative `width` averages the force instead.
     """
     moved = _force_moved(case.log, lag, max(-width, 1))
     return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=max(width, 1))
@@ -77,7 +77,7 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 
 
 def _sentence(lag: int, width: int, step: float) -> str:
-    """Say which shift and which average improve the fit, and what that suggests."""
+    """Write which shift and which average improve the fit, and what that suggests."""
     shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
         return f"shifting the force {shift} improves the fit considerably, which suggests a delay between the channels"

@@ -1,4 +1,4 @@
-"""A frequency response in which the motion goes against the force, as it does with a wrong sign of either."""
+"""Doubt: in a frequency response the motion opposes the force, by a wrong sign of one of both."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from friso.identification.response.analysis import Bench
 
 
 def find(bench: Bench) -> Iterator[RaisedDoubt]:
-    """Look at the sign of the driven mass.
+    """Examine the sign of the driven mass.
 
-    A mass line is at -180 degrees; one at 0 degrees goes against the force.
+    A mass line is at -180 degrees; one at 0 degrees has the wrong sign.
     """
     model = bench.two_masses
     if not (model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])):

@@ -22,10 +22,7 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] from break-away forces of `ramps`, extrapolated to rate 0.
-
-    It is given for all ramps and per direction.
-    """
+    """Static friction [N] from the break-away forces of `ramps`, extrapolated to rate 0, in total and per direction."""
 
     static: Estimate
     forward: Estimate
@@ -37,7 +34,7 @@ class BreakAway:
 def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
     """Estimate static friction from the break-away forces of ramps in a log (`rate_effect`).
 
-    Without the `mass` [kg] that moves, the interval allows for the inertia of the heaviest mass that can have moved so
+    Without the moving `mass` [kg], the interval allows for the inertia of the heaviest mass that can have moved so
     fast. Raises InputError for a missing channel.
     """
     ramps = force_ramps(log, mass)
@@ -63,14 +60,14 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Claim logs with enough ramps of the force in all, and some in each."""
+    """Claim logs with enough force ramps in total, and some in each."""
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
 
 
 def _partial(log: Log) -> bool:
-    """Tell whether a log holds too few ramps for static friction of its own."""
+    """Tell whether a log has too few ramps to determine static friction by itself."""
     return len(static_from_ramps(log).ramps.times) < ReadingSettings.current().fewest_ramps
 
 

@@ -30,7 +30,7 @@ class FrictionAtSpeeds:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
-    """Analyse a log of constant speeds, with the believed masses and the loop's crossover."""
+    """Analyse a log of constant speeds, with the assumed masses and the loop's crossover."""
     (log,) = logs
     assert isinstance(log, Log)
     mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
@@ -46,7 +46,7 @@ def _stated_exponent(prior: Prior) -> float | None:
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return friction in both directions, and the constant force, in the covariance's order.
+    """Return friction in both directions, and the constant force, in the order of the covariance.
 
     An exponent that the stage states is not included.
     """
@@ -57,9 +57,9 @@ def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate,
 
 
 def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Correlated:
-    """Return estimates as the covariance of the fit correlates them.
+    """Return estimates with their correlation in the fit.
 
-    The constant force is independent of them: passes go there and back.
+    The constant force is independent, because passes go there and back.
     """
     covariance = result.velocity.both.covariance
     if not covariance.size:
@@ -72,7 +72,7 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
 
 
 def _partial(log: Log) -> bool:
-    """Tell whether a log holds too few speeds for a curve of friction over speed."""
+    """Tell whether a log has too few speeds for a curve of friction over speed."""
     steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
     return not steady or distinct(np.array(steady)) < ReadingSettings.current().speeds_of_a_line
 
@@ -80,7 +80,7 @@ def _partial(log: Log) -> bool:
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Claim logs that mostly move at constant speeds, enough for a curve of friction over speed.
 
-    At the slowest speeds a body may stick and slip: a log that goes one way counts too.
+    At the slowest speeds a body may stick and slip, so a log with one direction counts too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

@@ -21,7 +21,7 @@ from friso.stage import Stage
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
-    """Analyse logs of one bench together, or a response as somebody measured it."""
+    """Analyse logs of one bench together, or a frequency response from another instrument."""
     (first, *_) = logs
     if not isinstance(first, Log):
         return analyse((), settings.band, measured=first)
@@ -29,9 +29,9 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log in which a periodic excitation moves a stage whose reference does not move.
+    """Claim a log in which a periodic excitation moves a stage whose reference stands.
 
-    It hardly rests, holds many frequencies, and turns often.
+    It hardly rests, contains many frequencies, and turns often.
     """
     settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
@@ -45,7 +45,7 @@ def _claims(course: Course) -> str | None:
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     """Return masses and joint from a two-mass model in newtons and metres.
 
-    A mass line alone is the whole mass. A resonance nearer the parasitic mode than the joint's shows no joint.
+    A mass line alone gives the whole mass. A resonance nearer to the parasitic mode than to the joint's gives no joint.
     """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
@@ -67,7 +67,7 @@ def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
 def _of_stage_alone(mass: float, stage: Stage) -> bool:
     """Tell whether a mass line [kg] shows the stage alone instead of all moving masses.
 
-    Above the mode of a free joint the stage moves alone. The line belongs to the believed mass that it is nearer to.
+    Above the mode of a free joint the stage moves alone. The line belongs to the nearer of the assumed masses.
     """
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:
@@ -77,7 +77,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's; else None."""
+    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's, or None."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None
@@ -89,7 +89,7 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
 
 
 def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the estimates that are shown; masses that are shared out of one move together."""
+    """Return the determined estimates; masses that are parts of one sum are fully correlated."""
     certain = determined(estimates)
     if all(estimate.name.startswith("masses.") for estimate in estimates):
         return certain, np.ones((len(certain), len(certain)))
@@ -97,7 +97,7 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
 
 
 def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
-    """Return the relative errors of the outputs over the band, the driven mass's first."""
+    """Return the relative errors of the outputs over the band, with the driven mass first."""
     return predicted(result, log, settings.period)
 
 

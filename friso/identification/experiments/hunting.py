@@ -23,7 +23,7 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class PredictedCycle:
-    """The cycle of a stage as friso predicts it: amplitude [m] and period [s]."""
+    """Limit cycle of a stage by prediction: amplitude [m] and period [s]."""
 
     amplitude: float
     period: float
@@ -56,8 +56,8 @@ class HuntingLog:
 def swings_of(log: Log) -> HuntingLog:
     """Return the swings in a log, from the last change of its reference on.
 
-    A cycle goes from one crossing upwards to the next, through the middle of the swing, with a hysteresis so that noise
-    is not counted. Raises InputError for a log without a position in SI units, and with less than two cycles.
+    A cycle lasts from one upward crossing of the middle of the swing to the next, with a hysteresis against noise.
+    Raises InputError for a log without a position in SI units, or with less than two cycles.
     """
     part = log.longest
     position = channel(log, "position")[part]
@@ -94,7 +94,7 @@ def swings_of(log: Log) -> HuntingLog:
 
 
 def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
-    """Return the side of 0 that values are on, 1 or -1, with hysteresis; shape (n,).
+    """Return the side of 0 of values, 1 or -1, with hysteresis; shape (n,).
 
     Values within the hysteresis keep the last side.
     """
@@ -118,7 +118,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: HuntingLog, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return nothing: a cycle depends on many keys at once."""
+    """Return no estimates, because a cycle depends on many keys at once."""
     return ()
 
 

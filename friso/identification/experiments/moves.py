@@ -28,10 +28,10 @@ WITHOUT_CONTROLLER = (
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose reference moves, or in which nothing repeats as an excitation does.
+    """Claim a log whose reference moves, or without a periodic excitation.
 
-    It is no series of constant speeds or force ramps; the position rests in between, or the force holds few
-    frequencies, as with sines.
+    It has no series of constant speeds or force ramps; the position rests in between, or the force has few frequencies,
+    as with sines.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
@@ -52,7 +52,7 @@ def _claims(course: Course) -> str | None:
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
     """Analyse a log of moves, in the machine's own loop if the user gave stage and reference.
 
-    Results of other experiments are taken into account.
+    Results of other experiments are used.
     """
     (whole,) = logs
     assert isinstance(whole, Log)
@@ -71,23 +71,23 @@ def _in_newtons(log: Log) -> bool:
 
 
 def _around(log: Log) -> Stage | None:
-    """Make up a stage around a log whose force is in newtons."""
+    """Make up a stage for a log whose force is in newtons."""
     part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
 def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of keys of the stage file, which are in newtons."""
+    """Return estimates of keys of the stage file, for a force in newtons."""
     return result.estimates if _in_newtons(result.log) else ()
 
 
 def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the estimates that are shown, as the fit correlates them."""
+    """Return the determined estimates with their correlation in the fit."""
     return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
-    """Say where the drive that was given is not the one simulated, and where no controller was."""
+    """List where the simulated drive differs from the given one, and where no controller was known."""
     settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
@@ -105,20 +105,20 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
 
 
 def _span(log: Log) -> str:
-    """The span of a log in words."""
+    """Return the time span of a log in words."""
     start, end = (round(float(log.time[k]), 9) + 0.0 for k in (0, -1))  # not -2e-16 s
     return f"{start:.6g} to {end:.6g} s"
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
-    """Simulate another log with a reference; None where the machine's own loop is not known."""
+    """Simulate another log with a reference; return None if the machine's own loop is not known."""
     if "reference" not in log or result.loop is None:
         return None
     return simulated_log(result, log, prior.flat(log) or None)
 
 
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
-    """Check that a log can be identified in the machine's own loop, and the other simulated.
+    """Check that a log can be identified in the machine's own loop, and that another can be simulated.
 
     Raises InputError otherwise.
     """

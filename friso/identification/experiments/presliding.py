@@ -57,9 +57,9 @@ VISCOUS = "friction.viscous"
 class Presliding:
     """Bristles and moving mass from small motion before sliding.
 
-    Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles have the `correlation` of shape (3, 3). Over
-    time [s], shape (n,), there are the position [m] of the body on the bearing, the force [N], low-passed, and that of
-    the model (empty where there is none). `unexplained` is the share of the friction's standard deviation that the
+    Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles have the `correlation` of shape (3, 3).
+    Signals over time [s], shape (n,), are the position [m] of the body on the bearing, the low-passed force [N], and
+    that of the model (empty without one). `unexplained` is the fraction of the friction's standard deviation that the
     model leaves.
     """
 
@@ -83,10 +83,10 @@ class Presliding:
 class _Fit:
     """A fit of mass and bristles at one low-pass.
 
-    `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is by how much
-    what the model leaves unexplained may hide of each. `late` [s] is by how much later the force comes than was taken;
-    `ends` says whether the bristles are at their end, and `left` is the share of the friction that is left. Over time
-    [s], shape (n,), there are the position of the body on the bearing, its force and that of the model, low-passed.
+    `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is how much of
+    each the residual may hide. `late` [s] is the delay of the force beyond the assumed one. `ends` tells whether the
+    bristles reach their limit, and `left` is the fraction of the friction that is left. Signals over time [s], shape
+    (n,), are position of the body on the bearing, its force and that of the model, low-passed.
     """
 
     values: np.ndarray
@@ -104,13 +104,13 @@ class _Fit:
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Estimate bristles from motion that is small against their break-away deflection.
 
-    The log holds position and force; if it has gaps, the longest stretch is used. A joint is held, or its deflection
-    is measured.
+    The log has position and force; if it has gaps, the longest stretch is used. A joint is held, or its deflection is
+    measured.
 
-    The intervals contain how much the answer changes with a lower low-pass and with the delay that fits best (which is
-    used if none is given), the doubt about the viscous friction that is subtracted from the damping, and what
-    unexplained friction may hide: friction falls with speed, which the model leaves out, and bristles of another law
-    bend otherwise. If much is left, nothing is shown. Raises InputError for missing channels.
+    The intervals include the change with a lower low-pass and with the best-fitting delay (which is used if none is
+    given), the uncertainty of the viscous friction that is subtracted from the damping, and the residual: friction
+    falls with speed, which the model leaves out, and bristles of another law bend otherwise. With a large residual
+    nothing is determined. Raises InputError for missing channels.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
@@ -139,7 +139,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
-    """Return a record low-passed and thinned to what a cut-off [Hz] of the force needs."""
+    """Return a record low-passed and thinned to the needs of a cut-off [Hz] of the force."""
     settings = ExperimentSettings.current()
     return record.seen(
         settings.low_pass_of_the_motion * cutoff,
@@ -148,14 +148,14 @@ def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
 
 
 def _nothing(why: str) -> Presliding:
-    """Return a result that shows nothing, for a reason."""
+    """Return a result without estimates, with the reason."""
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
     none = np.empty(0)
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
 
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
-    """Say why the fit is not one of bristles; "" where it is."""
+    """Return why the fit is not one of bristles; "" if it is."""
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
@@ -177,17 +177,16 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
-    """Fit again with the mass from the first fit and, with `late`, with the best-fitting delay."""
+    """Fit again with the mass from the first fit and, if `late`, with the best-fitting delay."""
     fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Fit the force at a low-pass by least squares, with a search for the bending.
+    """Fit the force at a low-pass by least squares, with a search for the one nonlinear parameter, the bending.
 
-    The bending of the bristles is the one nonlinear parameter. `mass` [kg] is believed to move; with `late`, the
-    effect of a little more delay is among the columns.
+    `mass` [kg] is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
@@ -216,7 +215,7 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
 
 
 def _apart(columns: np.ndarray, number: int) -> float:
-    """Return the size of what one of some columns, shape (m, p), has that the others do not."""
+    """Return the norm of the part of one column, of shape (m, p), that the others do not explain."""
     sizes = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(sizes > 0, sizes, 1.0)
     others = np.delete(scaled, number, axis=1)
@@ -228,8 +227,8 @@ def _apart(columns: np.ndarray, number: int) -> float:
 class _Equation:
     """The equation of a record of small motion at a low-pass.
 
-    It has the position [m] of the body on the bearing, shape (n,), and at the low-pass the force [N] and its columns
-    that do not depend on the bristles, shape (m,) each.
+    It has the position [m] of the body on the bearing, shape (n,), and, low-passed, the force [N] and the columns that
+    do not depend on the bristles, shape (m,) each.
     """
 
     low_pass: LowPass
@@ -239,9 +238,9 @@ class _Equation:
     rest: tuple[np.ndarray, ...]
 
     def columns(self, bending: float) -> np.ndarray:
-        """Return the columns of bristles of a bending q [1/m] and the rest, shape (m, p).
+        """Return the columns of bristles of a bending q [1/m] and all others, shape (m, p).
 
-        They are inertia, rate and deflection of the bristles, how a deflection at the start dies away, and the rest.
+        They are inertia, rate and deflection of the bristles, the decay of an initial deflection, and the rest.
         """
         moves = np.diff(self.body)
         z = deflections(moves, np.full(len(moves), 1 / bending))
@@ -253,8 +252,8 @@ class _Equation:
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
     """Set up the equation of a record.
 
-    A mode of the structure, whose mass m moves on its own spring at a frequency w, adds m/w^2 times the fourth
-    derivative of the position: what of it `between` does not know is among the rest.
+    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position: its part
+    that `between` does not know is among the other columns.
     """
     time, low_pass = record.time, LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(record, between, mass)
@@ -264,7 +263,7 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
-    """Analyse a log, with viscous friction off the damping where that is known."""
+    """Analyse a log, and subtract viscous friction from the damping if it is known."""
     (log,) = logs
     assert isinstance(log, Log)
     between = believed_between(prior, log)
@@ -283,13 +282,13 @@ def _at_most(total: Estimate) -> Estimate:
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return the bristles, and the whole mass where there is a stage whose masses share it."""
+    """Return the bristles, and the whole mass for a stage whose masses add up to it."""
     masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
     return (result.stiffness, result.damping, *masses)
 
 
 def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the estimates that are shown, as the fit correlates them; masses are shares of one."""
+    """Return the determined estimates with their correlation in the fit; masses are parts of one sum."""
     certain = determined(estimates)
     rows = [result.order(estimate.name) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]

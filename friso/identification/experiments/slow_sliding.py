@@ -47,7 +47,7 @@ DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --st
 
 @dataclass(frozen=True)
 class MassOnBristles:
-    """Mass and bristles as other experiments show them.
+    """Mass and bristles from other experiments.
 
     Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles each have the half-width of their interval;
     `exponent` is that of the Stribeck curve.
@@ -61,12 +61,12 @@ class MassOnBristles:
 
 @dataclass(frozen=True)
 class SlowSliding:
-    """Friction that slow sliding shows.
+    """Friction from slow sliding.
 
     `estimates` are Coulomb and static friction [N] and Stribeck velocity [m/s], with the `correlation` of shape (3, 3).
-    Over time [s], shape (n,), there are the velocity [m/s] of the body on the bearing, its friction [N], low-passed,
-    and that of the model (empty where there is none). `unexplained` is the share of the friction's standard deviation
-    that the model leaves.
+    Signals over time [s], shape (n,), are the velocity [m/s] of the body on the bearing, its low-passed friction [N],
+    and that of the model (empty without one). `unexplained` is the fraction of the friction's standard deviation that
+    the model leaves.
     """
 
     estimates: tuple[Estimate, ...]
@@ -85,9 +85,9 @@ class _Equation:
     """The equation of a record of slow sliding at a low-pass.
 
     It has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s], shape (n,);
-    at the low-pass, shape (m,), the friction [N] without the viscous part, and what a later force does to it, per
-    second. `sizes` are those of what is fitted: of Coulomb friction, of what static friction is more, of the Stribeck
-    velocity, of the constant force and of that of the bristles at the start.
+    low-passed, shape (m,), the friction [N] without the viscous part, and its change per second of delay. `sizes` are
+    the scales of the fitted numbers: Coulomb friction, excess of static friction, Stribeck velocity, constant force,
+    initial force of the bristles.
     """
 
     low_pass: LowPass
@@ -99,9 +99,9 @@ class _Equation:
     sizes: np.ndarray
 
     def model(self, p: np.ndarray) -> np.ndarray:
-        """Return the friction [N] of the model at the low-pass, shape (m,).
+        """Return the low-passed friction [N] of the model, shape (m,).
 
-        Of what is fitted, the first three are logarithms over their `sizes`, the other two shares of theirs.
+        The first three fitted numbers are logarithms relative to their `sizes`, the other two fractions of theirs.
         """
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
         stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
@@ -128,14 +128,14 @@ class _Equation:
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
-    """Estimate friction over speed from slow sliding there and back.
+    """Estimate Coulomb and static friction and the Stribeck velocity from slow sliding there and back.
 
-    It shows static and Coulomb friction and the Stribeck velocity. If the log has gaps, the longest stretch is used,
-    up to a number of samples in the settings. A joint is held, or its deflection is measured.
+    If the log has gaps, the longest stretch is used, up to a number of samples in the settings. A joint is held, or its
+    deflection is measured.
 
-    The intervals contain what a lower low-pass changes, the intervals of known mass, bristles and viscous friction,
-    the effect of the best-fitting delay, and the share of friction left unexplained; contact, mode and exponent are
-    taken as given. Raises InputError for missing channels.
+    The intervals include the change with a lower low-pass, the intervals of mass, bristles and viscous friction, the
+    effect of the best-fitting delay, and the fraction of friction left unexplained; contact, mode and exponent are
+    taken as exact. Raises InputError for missing channels.
     """
     settings = ExperimentSettings.current()
     record = record_of(
@@ -167,30 +167,30 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
-    """Return what is known beforehand, with each quantity in turn at the end of its interval."""
+    """Return the prior values with each quantity in turn at the end of its interval."""
     doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
 def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return how far a residual, (m,), moves the fitted numbers with derivatives (m, p)."""
+    """Return the shift of the fitted numbers by a residual, (m,), for derivatives (m, p)."""
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
 def _nothing(why: str) -> SlowSliding:
-    """Return a result that shows nothing, for a reason."""
+    """Return a result without estimates, with the reason."""
     none = np.empty(0)
     return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
 
 
 def _unknown(why: str) -> tuple[Estimate, ...]:
-    """Return the three quantities as not determined, for a reason."""
+    """Return the three quantities as not determined, with the reason."""
     return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Return the sizes of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
+    """Return the scales of the fitted numbers: the mean force [N], and the RMS velocity [m/s]."""
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
@@ -209,7 +209,7 @@ def _equation(
 
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
-    """Return what fits best from any start, shape (5,)."""
+    """Return the best fit from several starts, shape (5,)."""
     settings = ExperimentSettings.current()
     least, most = settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
@@ -240,10 +240,10 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 def _estimates(
     best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Turn fitted logarithms into the three quantities and their correlation.
+    """Convert fitted logarithms into the three quantities and their correlation.
 
-    The logarithms have a covariance, shape (3, 3), and `shifts` of them, shape (m, 3); a share of the friction is
-    `left`.
+    The logarithms have a covariance, shape (3, 3), and possible `shifts`, shape (m, 3); `left` is the unexplained
+    fraction of the friction.
     """
     settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])
@@ -259,10 +259,7 @@ def _estimates(
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """Return the estimates as far as the motion determines them.
-
-    Their model leaves a share of the friction unexplained.
-    """
+    """Return the estimates as far as the motion determines them, given the unexplained fraction of the friction."""
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
@@ -281,14 +278,14 @@ def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
-    """Analyse a log with the mass and the bristles that other experiments show."""
+    """Analyse a log with mass and bristles from other experiments."""
     (log,) = logs
     assert isinstance(log, Log)
     return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
 
 
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
-    """Return the mass and the bristles that other experiments show; None where they do not."""
+    """Return mass and bristles from other experiments, or None."""
     flat = prior.flat(log)
     masses = [key for key in flat if key.startswith("masses.")]
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
@@ -300,7 +297,7 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
 
 
 def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the estimates that are shown, as the fit correlates them."""
+    """Return the determined estimates with their correlation in the fit."""
     certain = determined(estimates)
     rows = [result.estimates.index(estimate) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]

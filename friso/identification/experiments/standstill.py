@@ -20,10 +20,10 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Wandering:
-    """How far the stage wanders in one log while its reference stands.
+    """Deviation of a stage in one log while its reference stands.
 
-    RMS about the mean and largest deviation from it [m], drift over the log [m] by a straight line, and the deviation
-    [m] over time [s], both of shape (n,).
+    It has RMS about the mean and largest deviation from it [m], drift over the log [m] by a straight line, and the
+    deviation [m] over time [s], both of shape (n,).
     """
 
     name: str
@@ -36,24 +36,21 @@ class Wandering:
 
 @dataclass(frozen=True)
 class StandstillResult:
-    """Logs at standstill, the first of which the others are compared with."""
+    """Logs at standstill; all others are compared with the first."""
 
     logs: tuple[Wandering, ...]
     warnings: tuple[str, ...] = ()
 
     @property
     def ratios(self) -> tuple[tuple[float, float], ...]:
-        """Return the RMS and the peak of every log over those of the first log.
-
-        A ratio is NaN if the first log does not wander.
-        """
+        """Return the RMS and the peak of every log over those of the first log, NaN if that does not move."""
         first = self.logs[0]
         pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
         return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)
 
 
 def wandering(log: Log) -> Wandering:
-    """Return how far the stage wanders in a log, about its mean distance from the reference.
+    """Return the deviation of the stage in a log about its mean distance from the reference.
 
     Raises InputError for a log without a position in SI units.
     """
@@ -75,12 +72,12 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return nothing: standstill shows no key of a stage."""
+    """Return no estimates, because standstill determines no key of a stage."""
     return ()
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose reference stands still, and which holds no force."""
+    """Claim a log whose reference stands still, and which has no force."""
     log = course.log
     if "reference" not in log or course.reference_moves or "force" in log:
         return None

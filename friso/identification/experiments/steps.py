@@ -23,7 +23,7 @@ from friso.identification.settings import ExperimentSettings
 from friso.stage import Stage
 
 STARTS = np.linspace(0.1, 0.7, 7)
-"""Shares of a plateau after which it may have settled, tried in turn."""
+"""Fractions of a plateau after which it may have settled, tried in turn."""
 
 KEY, UNIT = "joint.stiffness", "N/m"
 SOFT = "more deflection does not need more force: is the cart fixed?"
@@ -34,7 +34,7 @@ METHOD = "differences of force over differences of deflection between settled po
 class Window:
     """A settled window from `start` to `end` [s], with mean deflection [m] and force [N].
 
-    `force_error` is the standard error of the force at that deflection by block means, the rest of a drift included.
+    `force_error` is the standard error of the force at that deflection by block means, including the remaining drift.
     """
 
     start: float
@@ -48,9 +48,9 @@ class Window:
 class StepStiffness:
     """The stiffness [N/m] of a joint from position steps with the cart fixed.
 
-    It is that of all steps and of those up and down; `hysteresis` [N] is by how much more force stands at a deflection
-    reached from below than from above. There are the settled `windows`, the force [N] low-passed, shape (n,), and
-    whether the cart was fixed (None: not measured).
+    It is given for all steps, and for steps up and down; `hysteresis` [N] is the difference in force at a deflection
+    reached from below and from above. Further fields are the settled `windows`, the low-passed force [N], shape (n,),
+    and whether the cart was fixed (None: not measured).
     """
 
     stiffness: Estimate
@@ -100,7 +100,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
-    """Find stretches of a segment at a constant place that are long enough to average.
+    """Find stretches of a segment at a constant position that are long enough to average.
 
     The reference decides, or the position without one.
     """
@@ -129,10 +129,7 @@ def _scale(position: np.ndarray, spans: list[slice]) -> float:
 
 
 def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
-    """Return the approximate stiffness [N/m] from the later half of each plateau.
-
-    It is 0 without two plateaus.
-    """
+    """Return the approximate stiffness [N/m] from the later half of each plateau; 0 without two plateaus."""
     levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
     if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
         return 0.0
@@ -144,8 +141,8 @@ def _settled_window(
 ) -> Window | None:
     """Return the part of a plateau that has settled; None without one.
 
-    The deflection hardly drifts there, and the force drifts by no more than goes with that, but for a share of a step
-    or what noise explains.
+    There the deflection hardly drifts, and the force drifts no more than in proportion, apart from a fraction of a step
+    or from noise.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
@@ -168,17 +165,17 @@ def _settled_window(
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:
-    """Return the mean of a window, and its drift beyond what scatter explains (two errors)."""
+    """Return the mean of a window, and its drift beyond two standard errors."""
     mean = block_mean(values)
     shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
     return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
 
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
-    """Fit the differences of force on those of deflection by a line through the origin.
+    """Fit the differences of force over those of deflection by a line through the origin.
 
-    Neighbouring differences share a window: the variance is the larger of that of independent differences (a force that
-    wanders) and of differences of independent windows (noise), and no less than the noise within the windows says.
+    Neighbouring differences share a window: the variance is the larger of that of independent differences (a drifting
+    force) and of differences of independent windows (noise), and at least that of the noise within the windows.
     """
     method = METHOD + words
     count = int(chosen.sum())
@@ -218,7 +215,7 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
 
 
 def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
-    """Tell whether the cart stood still between the windows, and what to say of it."""
+    """Tell whether the cart stood still between the windows, with notes."""
     moved = cart(log)
     if moved is None:
         return None, ("The cart is assumed fixed: no channel shows whether it is.",)
@@ -240,14 +237,14 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return the stiffness, but not for a stage that has no joint."""
+    """Return the stiffness, unless the stage has no joint."""
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose position rests in several places, at forces that rise with the place.
+    """Claim a log whose position rests in several places, with a standing reference.
 
-    Its reference, if any, does not move.
+    The force at these places rises with the position.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

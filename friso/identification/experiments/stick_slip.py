@@ -44,9 +44,9 @@ KEY = "friction.static"
 class StickSlip:
     """Static friction from slow motion that sticks and slips.
 
-    Static friction [N] is that in all and per direction; there are the mean break-away force [N] per direction as
-    measured at its force rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor
-    offset, or unequal friction); and the joint's `stiffness` [N/m] as force and deflection of this log show it.
+    Fields are static friction [N] in total and per direction; the mean break-away force [N] per direction as measured
+    at its force rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or
+    unequal friction); and the joint's `stiffness` [N/m] from force and deflection of this log.
 
     Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor),
     break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
@@ -78,10 +78,10 @@ def static_from_stick_slip(
 ) -> StickSlip:
     """Estimate static friction from slow motion that sticks and slips.
 
-    With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is that times the
-    deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
-    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`. Slips from a deflection at the
-    `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown with its reason. Raises
+    With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is stiffness times
+    measured deflection; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. The
+    effect of the finite force rate is extrapolated or bounded, see `rate_effect`. Slips from a deflection at the
+    `stroke` [m] of the joint do not count. Quantities that the record cannot show are unknown, with the reason. Raises
     InputError for missing channels or an unusable stiffness.
     """
     settings = ExperimentSettings.current()
@@ -122,16 +122,13 @@ def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 
 
 def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
-    """Return the deflection of the joint [m], low-passed; None where it is not measured."""
+    """Return the low-passed deflection of the joint [m]; None if it is not measured."""
     measured = deflection(log)
     return None if measured is None else _smooth(log, measured, cutoff)
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Return the actuator's force less the stage's inertia [N], low-passed, or None.
-
-    It is None if the force is not measured.
-    """
+    """Return the low-passed actuator force less the stage's inertia [N]; None if the force is not measured."""
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -148,7 +145,7 @@ def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the force on the cart [N], low-passed, and the relative deviation of its scale."""
+    """Return the low-passed force on the cart [N], and the relative deviation of its scale."""
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
@@ -160,7 +157,7 @@ def _pull(
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
-    """Estimate the joint's stiffness as this log shows it."""
+    """Estimate the joint's stiffness from this log."""
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
@@ -177,7 +174,7 @@ def _peak(
 
     Returns its place and height, the pull at the onset of visible motion, the rate at which it rose over the last third
     of the rest, and whether it had stopped rising: it stayed within a hundredth of its peak for several times as long
-    as its usual rate takes, and the filter smears.
+    as its usual rate and the filter take.
     """
     settings = ExperimentSettings.current()
     rest, onset, start, top = marks
@@ -198,8 +195,8 @@ def _peak(
 def _unseen(speed: np.ndarray) -> float:
     """Count the samples for which motion may have been hidden in noise.
 
-    Its speed, from when it stood out to its highest, has the shape (n,): it had grown by a power of two in the time
-    that its first doubling took. A body that speeds up evenly was hidden for less.
+    The speed, (n,), from its first visible sample to its maximum, grew by a power of two in the time of its first
+    doubling. A body that accelerates evenly was hidden for less.
     """
     settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
@@ -210,7 +207,7 @@ def _unseen(speed: np.ndarray) -> float:
 
 
 def _why(shares: list[float]) -> str:
-    """Say why there are no slips."""
+    """Return why there are no slips."""
     if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
@@ -219,7 +216,7 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
-    """Make the result of all slips."""
+    """Make the result from all slips."""
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
 
@@ -265,7 +262,7 @@ def _answer(
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
-    """Say what to know before believing the result."""
+    """List notes for the reader of the result."""
     notes = []
     if count and not offset.determined:
         notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
@@ -291,8 +288,8 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
     """Return the mean of both directions, in which a common offset cancels.
 
-    If the cart slips in one direction only, its value counts. If one direction gives a value and the other only a
-    bound, the result is a bound, because the offset is not known.
+    If the cart slips in one direction only, its value counts. If one direction gives a value and the other a bound, the
+    result is a bound, because the offset is not known.
     """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
@@ -311,7 +308,7 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
-    """Return half of what the forward break-away exceeds the backward one by."""
+    """Return half of the difference between forward and backward break-away force."""
     name, method = (
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",
@@ -324,10 +321,7 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """Analyse stick-slip logs with the joint's stiffness.
-
-    It comes from other experiments, or from this log, or from the stage file.
-    """
+    """Analyse stick-slip logs with the joint's stiffness from other experiments, this log, or the stage file."""
     (log,) = logs
     assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)
@@ -339,12 +333,12 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return static friction, and the stiffness where it is that of the stage's joint."""
+    """Return static friction, and the stiffness if it is that of the stage's joint."""
     return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
 
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
-    """Tell whether a stiffness is the joint's own, not that of a limiter that holds it."""
+    """Tell whether a stiffness is the joint's, not that of a limiter that holds it."""
     settings = ExperimentSettings.current()
     if stage is None or stage.joint is None or not stiffness.determined:
         return False

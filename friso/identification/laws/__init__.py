@@ -1,1 +1,1 @@
-"""Friction laws fitted to the same logs, and which of them the record supports: by prediction of what was left out."""
+"""Fit friction laws to logs, and decide by prediction of left-out parts which laws the record supports."""

@@ -1,9 +1,8 @@
-"""Which friction laws a record supports: each is fitted without a part of it, and predicts that.
+"""Compare friction laws by cross-validation: each is fitted without a part of the record, and predicts that part.
 
-A law with more numbers always fits better; what it predicts of what it was not fitted to need not be better (cross-
-validation). A law is supported unless it clearly predicts worse than the best: by more than chance would have it (a t
-test of the differences by parts and one of their signs, at a level that counts all laws: Bonferroni), and by more than
-a difference of errors up to which laws predict alike.
+A law with more numbers always fits better, but does not always predict better. A law is supported unless it clearly
+predicts worse than the best: by more than chance (a t test of the differences by parts and a sign test, at a level that
+counts all laws: Bonferroni), and by more than an error below which laws count as equal.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
 @dataclass(frozen=True)
 class LawPrediction:
-    """A law fitted to all records, with its errors in predicting parts that were left out.
+    """A law fitted to all records, with its errors in predicting left-out parts.
 
-    The errors, shape (parts,), are shares of the friction's standard deviation in each part.
+    The errors, shape (parts,), are relative to the friction's standard deviation in each part.
     """
 
     fit: LawFit
@@ -40,21 +39,21 @@ class LawPrediction:
 
     @property
     def law(self) -> str:
-        """The name of the law."""
+        """Return the name of the law."""
         return self.fit.law
 
     @property
     def error(self) -> float:
-        """The mean of the errors."""
+        """Return the mean of the errors."""
         return float(self.errors.mean())
 
 
 @dataclass(frozen=True)
 class LawComparison:
-    """The friction laws, ranked by how well they predict logs, the best first.
+    """The friction laws, ranked by their prediction of logs, the best first.
 
     `logs` are the names of the logs used, `left_out` names the others, each with the reason, and `parts` counts the
-    parts that were predicted. `unseen` says whether fits began from the stage as it was before any log.
+    predicted parts. `unseen` tells whether fits started from the stage before any log.
     """
 
     predictions: tuple[LawPrediction, ...]
@@ -65,15 +64,12 @@ class LawComparison:
 
     @property
     def explained(self) -> bool:
-        """Whether any law predicts the record."""
+        """Tell whether any law predicts the record."""
         return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """Return the laws that predict the record about as well as the best.
-
-        There are none if no law predicts it.
-        """
+        """Return the laws that predict the record about as well as the best; empty if no law predicts it."""
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
@@ -86,9 +82,8 @@ class LawComparison:
 def _worse(differences: np.ndarray, level: float) -> bool:
     """Tell whether errors, shape (parts,), exceed those of another law by more than chance.
 
-    Two tests are made, at half the `level` each: of the mean difference, and of the sign of the differences. The
-    difference must also be larger than between laws that predict alike. A law that could not be run for a part is
-    worse.
+    Two tests are made, at half the `level` each: of the mean difference, and of the signs of the differences. The
+    difference must also exceed that of equal laws. A law that could not be run for a part is worse.
     """
     settings = LawSettings.current()
     if not np.isfinite(differences).all():
@@ -103,7 +98,7 @@ def _worse(differences: np.ndarray, level: float) -> bool:
 
 
 def comparable() -> list[str]:
-    """List the laws that stick and can be made from what is measured."""
+    """List the laws with stiction that measured friction can be converted into."""
     return [
         name
         for name, law in FRICTION.classes.items()
@@ -112,11 +107,10 @@ def comparable() -> list[str]:
 
 
 def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Progress = silent) -> LawComparison:
-    """Fit every law to the same logs, and let each predict what it was not fitted to.
+    """Fit every law to the logs, and let each predict left-out parts.
 
-    Fits begin from the stage before any log (`prior`), or from the `stage` that all logs show where no fit can begin
-    from its law. Raises InputError where no log shows friction before sliding, and for a stage whose law does not
-    stick.
+    Fits start from the stage before any log (`prior`), or from the `stage` identified from all logs if no fit can start
+    from its law. Raises InputError if no log shows friction before sliding, and for a stage whose law has no stiction.
     """
     records, left_out = _records(logs, prior)
     if not records:
@@ -144,7 +138,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
-    """Read records from the logs, and say of others why nothing can be read from them."""
+    """Read records from the logs; return for the others why they cannot be used."""
     records, left_out = [], {}
     for log in logs:
         if not {"position", "force"} <= {*log.signals}:

@@ -1,4 +1,4 @@
-"""A log as a body that is dragged along what was measured: the friction force on it, and that of a law."""
+"""Represent a log as a body dragged along the measured motion, with the friction force on it and that of a law."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.stage.tables import friction_law
 
 @dataclass(frozen=True)
 class DraggedRecord:
-    """A log as a body that is dragged along what was measured.
+    """A log as a body dragged along the measured motion.
 
     Over time [s] it has the position [m] of the body on the bearing, shape (n,); low-passed, inside the record, the
     force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass, shape (m,).
@@ -33,14 +33,14 @@ class DraggedRecord:
 
     @property
     def interval(self) -> float:
-        """Time between samples [s]."""
+        """Return the time between samples [s]."""
         return float(self.low_pass.time[1] - self.low_pass.time[0])
 
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Return the friction force [N] of laws along the record, low-passed, shape (runs, m).
+        """Return the low-passed friction force [N] of laws along the record, shape (runs, m).
 
-        All have one structure, given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN. The
-        bristles begin unbent.
+        The laws have one structure, given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN.
+        The bristles start unbent.
         """
         settings = LawSettings.current()
         law = flat["friction.model"]
@@ -63,7 +63,7 @@ class DraggedRecord:
 
 
 def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
-    """Read the longest stretch of a log; or say why nothing can be read from it.
+    """Read the longest stretch of a log, or return why it cannot be read.
 
     Raises InputError for missing channels.
     """
@@ -82,10 +82,10 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 
 
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
-    """Choose what is left out by turns, by record, as masks of shape (m,).
+    """Choose the parts to leave out in turn, by record, as masks of shape (m,).
 
-    Each record is left out as a whole, where there are as many as `pieces` are wanted; of fewer, pieces in time, as
-    many of each.
+    Each record is left out as a whole, if there are at least `pieces` records; otherwise each is cut into equally many
+    pieces in time.
     """
     cuts = -(-pieces // len(records))
     parts = []

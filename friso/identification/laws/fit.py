@@ -1,4 +1,4 @@
-"""One friction law fitted to records: mass, steady friction, bristles and whatever shape the law has before sliding."""
+"""Fit one friction law to records: mass, steady friction, bristles and the shape of the law before sliding."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.stage.tables import friction_law
 
 FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "viscous": 100.0, "stiffness": 30.0,
        "damping": 100.0}  # fmt: skip
-"""Numbers that are fitted to every law, and the factor by which they may differ from what was known beforehand."""
+"""Numbers fitted for every law, and the factor by which they may differ from prior values."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class LawFit:
 
 @dataclass(frozen=True)
 class LawProblem:
-    """A law to be fitted to records, with the mass [kg] and the friction known beforehand.
+    """A law to be fitted to records, with the prior mass [kg] and friction.
 
-    The Stribeck exponent is as known beforehand, and is not fitted.
+    The Stribeck exponent is not fitted.
     """
 
     law: str
@@ -43,12 +43,12 @@ class LawProblem:
 
     @property
     def names(self) -> list[str]:
-        """Names of the numbers that are fitted, each as a logarithm."""
+        """Return the names of the fitted numbers, each of which is a logarithm."""
         return [*FAR, *friction_law(self.law).shape]
 
     @property
     def start(self) -> np.ndarray:
-        """The numbers as known beforehand, shape (parameters,)."""
+        """Return the prior values of the numbers, shape (parameters,)."""
         settings = LawSettings.current()
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
@@ -66,14 +66,14 @@ class LawProblem:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper bounds of the numbers, each of shape (parameters,)."""
+        """Return lower and upper bounds of the numbers, each of shape (parameters,)."""
         far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
         centre = self.start[: len(far)]
         low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
         return np.concatenate([centre - far, low]), np.concatenate([centre + far, high])
 
     def keys(self, numbers: np.ndarray) -> dict[str, float]:
-        """Return the keys of the law [SI] for some numbers, shape (parameters,)."""
+        """Return the keys of the law [SI] for given numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
         before = self.before.levels
@@ -89,9 +89,9 @@ class LawProblem:
         return law.shaped(measured, {name: value[name] for name in law.shape})
 
     def errors(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Return what is left of the force [N] in each record, about its mean, shape (rows, m).
+        """Return the residual force [N] of each record, about its mean, shape (rows, m); infinite for a failed run.
 
-        The numbers have the shape (rows, parameters). What is left is infinite where a run failed.
+        The numbers have the shape (rows, parameters).
         """
         columns = [self.keys(row) for row in rows]
         flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}
@@ -106,9 +106,9 @@ class LawProblem:
         return left
 
     def fitted(self, used: Sequence[np.ndarray], starts: np.ndarray) -> LawFit:
-        """Fit the law from the best of some starts to the samples that are `used` of each record.
+        """Fit the law to the `used` samples of each record, from the best of some starts.
 
-        The starts have the shape (starts, parameters), and `used` holds a mask of shape (m,) for each record.
+        The starts have the shape (starts, parameters), and `used` has a mask of shape (m,) for each record.
         """
         settings = LawSettings.current()
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
@@ -139,7 +139,7 @@ class LawProblem:
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:
-        """Return starts, (starts, parameters), with bristles softer and stiffer than believed."""
+        """Return starts, (starts, parameters), with bristles softer and stiffer than assumed."""
         settings = LawSettings.current()
         starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
@@ -150,10 +150,7 @@ class LawProblem:
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the weighted residuals of all records, shape (rows, samples).
-
-        They are a large number where a run failed.
-        """
+        """Return the weighted residuals of all records, shape (rows, samples); a large number for a failed run."""
         settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]

@@ -1,1 +1,1 @@
-"""Reading logs: sniff, table of channels, roles, checks, log."""
+"""Read logs: recognise the format, read channels, assign roles, check signals, and assemble the log."""

@@ -1,4 +1,4 @@
-"""From a file and what the user said to a log: roles, units, one time base, checks."""
+"""Assemble a log from a file and the user's mapping: roles, units, one time base, checks."""
 
 from __future__ import annotations
 
@@ -29,12 +29,11 @@ def read_log(
     needed: Sequence[str] = ("position",),
     foreign: Sequence[str] = (),
 ) -> Log:
-    """Read the log in a file: signals by role, SI, on one time base.
+    """Read the log in a file: signals by role, SI, on one time base, with lines about doubtful parts.
 
-    It says line by line what was read and what is doubtful. With `strict`, every signal must be in the SI unit of its
-    role, but those of the `foreign` roles, which may be in another unit of their own; without, all are kept as they
-    are, and listed in `Log.units`. `needed` are the roles that must be there; a position may be the integral of the
-    velocity. Raises LogError (one message) for what cannot be read or used.
+    With `strict`, every signal must be in the SI unit of its role, except those of the `foreign` roles; without, all
+    units are kept and listed in `Log.units`. `needed` are the roles that must be present; a position may be the
+    integral of the velocity. Raises LogError (one message) for files that cannot be read or used.
     """
     path, mapping = Path(path), mapping or Mapping()
     form = FORMATS[file_format(path)]
@@ -72,7 +71,7 @@ def read_log(
 
 
 def _undecided(proposal: Proposal) -> list[str]:
-    """Write a line for each role that no channel has since several could."""
+    """Return a line for each role for which several channels are possible."""
     return [
         f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"
@@ -81,9 +80,9 @@ def _undecided(proposal: Proposal) -> list[str]:
 
 
 def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
-    """Return each role's channel on even instants in the unit of the role.
+    """Return each role's channel at even instants in the unit of the role.
 
-    A channel that was only proposed and that nobody needs is left out, with a warning, where it has no instants or no
+    A channel that was only proposed and that nobody needs is left out, with a warning, if it has no instants or no
     unit; others raise LogError.
     """
     clock = chosen.get("time")
@@ -122,7 +121,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
-    """Say where the instants come from."""
+    """Return lines on the origin of the instants."""
     if reading.mapping.sample_time is not None:
         return [
             f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
@@ -152,7 +151,7 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
 
 
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
-    """Check that a log is long enough, and that signals change that should.
+    """Check that a log is long enough, and that signals that should change do.
 
     Raises LogError.
     """
@@ -171,7 +170,7 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
-    """List what the engineer should know of the signals before believing them."""
+    """List warnings about the signals for the engineer."""
     settings = LogSettings.current()
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():
@@ -193,7 +192,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 
 
 def _lost(base: Track) -> list[str]:
-    """Say how many samples were lost."""
+    """Return the number of lost samples in words."""
     if not base.bridged.any():
         return []
     places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
@@ -205,7 +204,7 @@ def _lost(base: Track) -> list[str]:
 
 
 def _spans(base: Track) -> str:
-    """The segments in words."""
+    """Return the segments in words."""
     parts = base.segments
     listed = ", ".join(f"{_instant(base, p.start)} to {_instant(base, p.stop - 1)}" for p in parts[:6])
     more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
@@ -214,6 +213,6 @@ def _spans(base: Track) -> str:
 
 
 def _instant(base: Track, number: int) -> str:
-    """The instant of a sample in words; what rounding leaves of the beginning is 0."""
+    """Return the instant of a sample in words, with 0 for rounding at the beginning."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

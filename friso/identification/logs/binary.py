@@ -1,11 +1,9 @@
-"""The program in which binary logs are read, by the libraries of their formats; `friso.identification.logs.confined`
-runs it.
+"""Program that reads binary logs by the libraries of their formats, run by `friso.identification.logs.confined`.
 
 It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY CPU SECONDS``, the memory in
-bytes (0 for no limit), and the time [s] of a processor, which not every system counts. On standard output, pickled:
-what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and the message of the error. It ends after
-these seconds whatever the library is at, and at once when nobody holds its standard input open any more: who started it
-was killed.
+bytes (0 for no limit), and the processor time [s], which not every system counts. It writes, pickled, the contents of
+the file as plain dicts, lists, texts, numbers and NumPy arrays, and the error message. It ends after these seconds
+whatever the library does, and at once when its standard input is closed because the parent was killed.
 """
 
 from __future__ import annotations
@@ -24,14 +22,14 @@ from typing import Any
 import numpy as np
 
 OBJECT = "\0object"
-"""Key of what stands for an object whose content only MATLAB can read (timeseries, Dataset, tf): its class."""
+"""Key that marks an object whose content only MATLAB can read (timeseries, Dataset, tf), with its class."""
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
-"""The first bytes of a file of HDF5."""
+"""First bytes of an HDF5 file."""
 
 
 MOST, PER_BYTE = 256 << 20, 16
-"""Bytes that what is read may take, besides a multiple of the size of the file."""
+"""Most bytes of the contents: a fixed number plus a multiple of the size of the file."""
 
 
 def is_hdf5(head: bytes) -> bool:
@@ -47,7 +45,7 @@ def mat_tree(path: Path) -> dict[str, Any]:
 
 
 def _object(kind: str) -> dict[str, str]:
-    """Return what stands for an object whose content only MATLAB can read."""
+    """Return the mark of an object whose content only MATLAB can read."""
     return {OBJECT: kind}
 
 
@@ -66,7 +64,7 @@ def _read_old(path: Path) -> dict[str, Any]:
 
 
 def _from_scipy(value: Any) -> Any:
-    """Turn what scipy read into a tree of dict, list, array and str."""
+    """Convert results of scipy into a tree of dict, list, array and str."""
     from scipy.sparse import issparse
 
     if hasattr(value, "_fieldnames"):
@@ -95,8 +93,7 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 def _own(group: Any, name: Any) -> Any:
     """Return an item of a group.
 
-    Raises ValueError for one that is a link: it may lead into any file of the system, by another link too, and the log
-    would show that as its own.
+    Raises ValueError for a link: it may lead to any file of the system, which the log would then show as its own.
     """
     import h5py
 
@@ -106,10 +103,7 @@ def _own(group: Any, name: Any) -> Any:
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
-    """Turn a group or data set into a tree of dict, list, array and str.
-
-    MATLAB's arrays stand transposed.
-    """
+    """Convert a group or data set into a tree of dict, list, array and str, with MATLAB's arrays transposed."""
     import h5py
 
     if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references lead to any data set
@@ -168,7 +162,7 @@ def lvm_content(path: Path) -> dict[str, Any]:
 def tdms_channels(path: Path) -> dict[str, Any]:
     """Read the channels of a TDMS file, and the library's messages.
 
-    A file that ends early is read as far as it goes.
+    A truncated file is read as far as possible.
     """
     import nptdms
 
@@ -192,15 +186,15 @@ def tdms_channels(path: Path) -> dict[str, Any]:
 
 
 class _Heard(logging.Handler):
-    """What a library logs, kept as lines."""
+    """Handler that stores a library's log messages as lines."""
 
     def __init__(self) -> None:
-        """Begin with no lines."""
+        """Start without lines."""
         super().__init__(logging.WARNING)
         self.lines: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
+        """Store a record as a line."""
         self.lines.append(record.getMessage()[:120])
 
 
@@ -213,10 +207,7 @@ READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
 
 
 def _plain(node: Any) -> Any:
-    """Turn a tree into plain types.
-
-    What a library derives from them would have to be trusted when it is read again.
-    """
+    """Convert a tree into plain types, because subclasses would have to be trusted when unpickled."""
     if isinstance(node, dict):
         return {str(key): _plain(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
@@ -228,24 +219,24 @@ def _plain(node: Any) -> Any:
 
 
 def most_bytes(size: int) -> int:
-    """Return how many bytes a file of so many may hold, pickled."""
+    """Return the largest pickled size of the contents of a file of a given size."""
     return MOST + PER_BYTE * size
 
 
 def _too_much(size: int, most: int) -> str:
-    """Say that a file would take too much memory."""
+    """Return the message on a file that would take too much memory."""
     return f"it would take {size / 1e6:.0f} MB of memory, and a file of its size has at most {most / 1e6:.0f} MB"
 
 
 def _end_with_parent() -> None:
-    """Wait until nobody holds standard input open any more, and end."""
+    """Wait until standard input is closed, then end the process."""
     while os.read(0, 1):
         pass
     os._exit(1)
 
 
 def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
-    """Read a file within bounds of memory [B], time of a processor [s] and time [s]."""
+    """Read a file within bounds of memory [B], processor time [s] and time [s]."""
     faulthandler.dump_traceback_later(seconds, exit=True)  # by a thread that needs no lock of the interpreter
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if sys.platform != "win32":

@@ -1,4 +1,4 @@
-"""What a reader finds in a file: channels, each with its own time, and single numbers."""
+"""Define the result of a reader: channels, each with its own time, and single numbers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from friso.escapes import one_line
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of a file: its values, (n,), as they stand there, and its unit ("" for none).
+    """A channel of a file: its values, (n,), as stored, and its unit ("" for none).
 
-    `time` holds the instants in seconds, shape (n,), or None if the file has no time; `source` says where in the file
-    the channel stands ("column 3", "exp1.Y(2)"). Texts are one line each, escaped: messages and tables name them.
+    `time` has the instants in seconds, shape (n,), or None if the file has no time; `source` is the place in the file
+    ("column 3", "exp1.Y(2)"). Texts are one line each, escaped, because messages and tables show them.
     """
 
     name: str
@@ -26,16 +26,16 @@ class Channel:
     source: str
 
     def __post_init__(self) -> None:
-        """Escape the texts."""
+        """Escape the texts of the channel."""
         for name in ("name", "unit", "source"):
             object.__setattr__(self, name, one_line(getattr(self, name)))
 
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """The channels of a file, under names of their own (`unique`).
+    """The channels of a file, under unique names (`unique`).
 
-    `scalars` are single numbers in it by name, and `read` says what was read, a line each (format, delimiter, decimal
+    `scalars` are single numbers of the file by name, and `read` are lines about the reading (format, delimiter, decimal
     sign, rows left out and why).
     """
 
@@ -53,7 +53,7 @@ class ChannelTable:
 
 
 def unique(names: Sequence[str]) -> list[str]:
-    """Return names, with a number behind those that are taken; empty ones stay."""
+    """Return names with numbers appended to repeated ones; empty names stay."""
     taken, counts, out = {*names}, Counter[str](), []
     for name in names:
         counts[name] += 1

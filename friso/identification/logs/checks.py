@@ -1,4 +1,4 @@
-"""What makes a signal doubtful: repeated stamps, constant, clipped, held, wrapped; and signals that contradict."""
+"""Check signals: repeated stamps, constant, clipped, held or wrapped values, and contradictions between signals."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return a channel without samples that repeat the one before, and their count.
+    """Return a channel without samples that repeat the stamp [s] and value before, and their count.
 
-    They repeat stamp [s] and value. Raises LogError for time that decreases and for another value at the same stamp.
+    Raises LogError for decreasing time and for two values at one stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
@@ -36,15 +36,15 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
 
 
 COUNTER_BITS = 64
-"""Bits of a counter at most."""
+"""Most bits of a counter."""
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Take the jumps of its overflow out of a counter's whole numbers, and return its bits.
+    """Remove the overflow jumps from the whole numbers of a counter, and return its bits.
 
-    Values are unchanged, with 0 bits, where it is no counter that overflows. A counter of b bits steps back by nearly
-    2^b; every other step is below 2^b/4, and with 2^b added the step back is at most twice as large as those (a square
-    wave fails this).
+    Values without overflow are unchanged, with 0 bits. A counter of b bits jumps by nearly 2^b; every other step is
+    below 2^b/4, and with 2^b added the jump is at most twice as large as the other steps (a square wave fails this
+    test).
     """
     finite = values[np.isfinite(values)]
     if finite.size < 3 or np.any(finite != np.round(finite)) or np.abs(finite).max() > 2.0**COUNTER_BITS:
@@ -62,7 +62,7 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def constant(name: str, values: np.ndarray) -> bool:
-    """Tell whether a signal does not change at all."""
+    """Tell whether a signal never changes."""
     return bool(np.ptp(values) == 0)
 
 
@@ -73,10 +73,10 @@ def rises_evenly(values: np.ndarray) -> bool:
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Return the share of samples in flat tops that show that a signal is clipped.
+    """Return the fraction of samples in flat tops, which show that a signal is clipped.
 
-    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink, the step before
-    being at least a fifth of the largest step, or it hardly ever repeats a value elsewhere.
+    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink (the step before is
+    at least a fifth of the largest step), or hardly ever repeats a value elsewhere.
     """
     settings = LogSettings.current()
     steps = np.abs(np.diff(values))
@@ -94,9 +94,9 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """Return the largest step of a signal and the sample behind it, if it is no motion.
+    """Return the largest step of a signal and the sample after it, if the step is no motion.
 
-    It is many times larger than all steps but a few; otherwise 0 and 0.
+    Such a step is many times larger than nearly all others; otherwise the result is 0 and 0.
     """
     settings = LogSettings.current()
     steps = np.diff(values)
@@ -109,9 +109,9 @@ def jumps(values: np.ndarray) -> tuple[float, int]:
 
 
 def samples_held(values: np.ndarray) -> int:
-    """Return for how many samples each value is held; 1 where the signal changes at any sample.
+    """Return for how many samples each value is held; 1 if the signal changes at any sample.
 
-    The changes all fall on every n-th sample, n up to 20 (a signal that changes more rarely is one of steps).
+    The changes all fall on every n-th sample, n up to 20 (a signal that changes more rarely consists of steps).
     """
     changes = np.flatnonzero(np.diff(values) != 0)
     if changes.size < 50:
@@ -122,7 +122,7 @@ def samples_held(values: np.ndarray) -> int:
 
 
 def interpolated(values: np.ndarray) -> int:
-    """Return how many samples lie on each straight piece of a signal; 1 if it has none.
+    """Return the number of samples on each straight piece of a signal; 1 if it has no such pieces.
 
     A slower signal that was resampled bends only at every n-th sample, n up to 20.
     """
@@ -143,10 +143,10 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Return measured velocity over the derivative of position, and their correlation.
+    """Return measured velocity over the derivative of position by least squares, and their correlation.
 
-    Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11 samples; the ratio is by least
-    squares. Returns NaN and 0 if there is nothing to compare.
+    Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11 samples. Returns NaN and 0 if
+    nothing can be compared.
     """
     from scipy.signal import savgol_filter
 
@@ -175,9 +175,9 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Say what is wrong between position [m] and velocity [m/s], "" for nothing.
+    """Return the warning on a contradiction between position [m] and velocity [m/s], "" for none.
 
-    Both are sampled every `period` [s]; a factor points to wrong units or counts.
+    Both are sampled every `period` [s]; a usual factor points to wrong units or counts.
     """
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:

@@ -1,5 +1,4 @@
-"""Binary logs, read in a process of their own: a damaged or hostile file may crash or exhaust the library of its
-format, which is then an error of that file and of nothing else."""
+"""Read binary logs in a separate process, in which a damaged or hostile file can crash only its own reader."""
 
 from __future__ import annotations
 
@@ -20,13 +19,13 @@ from friso.identification.logs.settings import LogSettings
 from friso.platform.system import LIMITS_MEMORY
 
 CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
-"""What ends a process that has taken a processor's time for too long, where the system counts that."""
+"""Signal that ends a process that has used too much processor time, on systems that count it."""
 
 
 def content(kind: str, path: Path) -> dict[str, Any]:
-    """Read what a file of a `kind` of `friso.identification.logs.binary` holds.
+    """Read the contents of a file of a `kind` of `friso.identification.logs.binary`.
 
-    Raises LogError where it cannot be read within bounds of time, and of memory where the system keeps such
+    Raises LogError for a file that cannot be read within bounds of time, and of memory where the system has such limits
     (`LIMITS_MEMORY`).
     """
     status = path.stat()
@@ -35,7 +34,7 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    """Read a file that has not changed since it was last asked for only once."""
+    """Read a file, once for every change of it."""
     settings = LogSettings.current()
     memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
     seconds = settings.time_of_reading + size / settings.speed_of_reading
@@ -58,9 +57,9 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
 
 
 def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
-    """Return what a program says, of more than `most` bytes the first.
+    """Return the first `most` bytes of a program's output; None if it exceeded its processor time.
 
-    None where it took more of a processor's time than it may. Raises TimeoutError where it takes longer.
+    Raises TimeoutError if it takes too long.
     """
     environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     pipe, late = subprocess.PIPE, []
@@ -81,15 +80,15 @@ def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
 
 
 class _PlainUnpickler(pickle.Unpickler):
-    """A reader of plain types and NumPy arrays that refuses anything else."""
+    """Unpickler of plain types and NumPy arrays that refuses everything else."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return what an array of numbers is made of, and nothing else."""
+        """Return the parts of an array of numbers, and refuse everything else."""
         if module.partition(".")[0] == "numpy" and name in ("ndarray", "dtype", "_reconstruct", "_frombuffer"):
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name}")
 
 
 def broken(kind: str, why: str, path: Path) -> LogError:
-    """The error for a file that cannot be read."""
+    """Return the error for a file that cannot be read."""
     return LogError("log", f"a {kind} file that cannot be read ({why})", f"a complete {kind} file", "", str(path))

@@ -1,4 +1,4 @@
-"""Delay between two instruments: estimated with an interval, offered, never applied."""
+"""Estimate the delay between two instruments with an interval; the delay is reported, never applied."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from friso.identification.logs.settings import LogSettings
 
 
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Offer the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
+    """Report the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
 
     Both are sampled every `period` [s].
     """
@@ -25,11 +25,10 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Write the delay of the motion [m] behind the force [N], sampled every `period` [s].
+    """Report the delay of the motion [m] behind the force [N], sampled every `period` [s]; "" for none.
 
-    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: with acceleration
-    alone friction would look like a delay, and so would a spring. The lag with the least residual counts. Returns ""
-    for no delay.
+    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant, because with
+    acceleration alone friction or a spring would look like a delay. The lag with the smallest residual counts.
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     place, velocity, acceleration = (_smoothed(position[part], order, period) for order in (0, 1, 2))
@@ -40,10 +39,10 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
 
 
 def lag(first: np.ndarray, second: np.ndarray) -> float:
-    """Return by how many samples the second signal comes after the first.
+    """Return by how many samples the second signal lags behind the first.
 
-    It is the peak of their cross-correlation, to a fraction of a sample by a parabola; NaN where its height is below
-    0.5 or it lies at the border of what is searched.
+    It is the peak of their cross-correlation, interpolated by a parabola; NaN if its height is below 0.5 or it lies at
+    the border of the search.
     """
     settings = LogSettings.current()
     first, second = first - first.mean(), second - second.mean()
@@ -59,16 +58,16 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """Return by how many samples causes, (n, p), lag behind the effect they add up to.
+    """Return by how many samples causes, (n, p), lag behind the effect that they add up to.
 
-    It is the lag with the largest share explained by least squares, to a fraction of a sample; NaN if that share is
-    below 0.5 or the lag lies at the border.
+    It is the lag with the largest fraction explained by least squares, interpolated; NaN if that fraction is below 0.5
+    or the lag lies at the border.
     """
     return _peak(_explained(effect, causes), 0.5)
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """Return the lag that fits best; NaN where no lag at all leaves little more."""
+    """Return the best-fitting lag; NaN if zero lag fits almost as well."""
     settings = LogSettings.current()
     shares = _explained(effect, causes)
     return (
@@ -79,7 +78,7 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
-    """Return the share of an effect that its causes explain at each lag that is searched."""
+    """Return the fraction of an effect that its causes explain at each lag of the search."""
     settings = LogSettings.current()
     middle = (
         effect[settings.longest_delay_samples : -settings.longest_delay_samples]
@@ -96,10 +95,7 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
 
 def _peak(heights: np.ndarray, least: float) -> float:
-    """Return the place of the highest of some values, by a parabola through three of them.
-
-    NaN if it is below `least` or lies at an end.
-    """
+    """Return the place of the highest value, by a parabola through three values; NaN if below `least` or at an end."""
     i = int(np.argmax(heights))
     if heights[i] < least or i in (0, heights.size - 1):
         return np.nan
@@ -109,9 +105,9 @@ def _peak(heights: np.ndarray, least: float) -> float:
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
-    """Return the mean estimate over blocks of a record and half its 95 % interval (Student).
+    """Return the mean estimate over blocks of a record and half of its 95 % interval (Student).
 
-    NaN if fewer than half of the blocks show an estimate.
+    NaN if fewer than half of the blocks have an estimate.
     """
     settings = LogSettings.current()
     from scipy.stats import t as student
@@ -128,9 +124,9 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """Write an estimate in samples in words, "" where the motion does not show a delay.
+    """Return an estimate in samples in words, "" if the motion does not show a delay.
 
-    Its interval holds 0 then, it is below a quarter of a sample, or the blocks differ by samples.
+    This is the case if its interval contains 0, it is below a quarter of a sample, or the blocks differ by samples.
     """
     value, half = estimate
     if not np.isfinite(value) or abs(value) <= max(half, LogSettings.current().shortest_delay_samples) or half > 1:
@@ -143,7 +139,7 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Return the smoothed derivative of an order, without the ends; all values if there are few."""
+    """Return the smoothed derivative of an order, without the ends; of few values all of them."""
     settings = LogSettings.current()
     from scipy.signal import savgol_filter
 

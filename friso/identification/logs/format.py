@@ -1,4 +1,4 @@
-"""What a format of logs declares of itself, and the registry of these."""
+"""Define what a log format declares, and the registry of formats."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from friso.registry import Registry
 
 @dataclass(frozen=True)
 class FileHead:
-    """What a file is recognised by: where it lies, and its first 520 bytes."""
+    """Data from which the format of a file is recognised: its path, and its first 520 bytes."""
 
     path: Path
     start: bytes
 
     @cached_property
     def lines(self) -> list[str]:
-        """Its first lines; [] where it is no text."""
+        """Return the first lines of the file; [] for one that is no text."""
         try:
             return decoded_head(self.path)[1]
         except LogError:
@@ -34,10 +34,10 @@ class FileHead:
 class LogFormat:
     """A format of logs: its `title`, how it is recognised, and the reader of its channels.
 
-    Formats are asked by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
-    `units`: it can hold units; `times`: its channels come with their instants, so that no column has to. A file that
-    `holds_response` holds a frequency response instead of signals over time, which `read_response` reads. Readers
-    raise LogError.
+    Formats are tried by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
+    `units`: it can contain units; `times`: its channels come with their instants, so that no time column is needed. A
+    file that `holds_response` contains a frequency response instead of signals over time, which `read_response` reads.
+    Readers raise LogError.
     """
 
     title: str
@@ -51,4 +51,4 @@ class LogFormat:
 
 
 FORMATS: Registry[LogFormat] = Registry("friso.identification.logs.formats", "FORMAT")
-"""Every module of `friso/identification/logs/formats/` declares one."""
+"""All log formats; every module of `friso/identification/logs/formats/` declares one."""

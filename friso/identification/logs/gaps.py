@@ -1,4 +1,7 @@
-"""What a log does not tell, all of it at once: channels for roles, units, the sample time; and the options that do."""
+"""Collect all missing information about a log, with the options that supply it.
+
+Missing may be channels for roles, units, or the sample time.
+"""
 
 from __future__ import annotations
 
@@ -31,21 +34,20 @@ from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
 
 OPTIONAL = ("velocity", "acceleration")
-"""Roles that no analysis needs: where several channels could be one, none is."""
+"""Roles that no analysis needs; with several candidates they stay empty."""
 
 _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
 """Letters with which channels of a role often begin, to choose the example of a message."""
 
 
 class GapsError(LogError):
-    """What logs do not say and reading them needs, all in one error.
+    """Error with all information that is missing for reading logs.
 
-    Each of its errors alone would stop the reading, and has the option that mends it as its example. `proposed` holds
-    proposed channels by role.
+    Each single error names the option that supplies it as its example. `proposed` has the proposed channels by role.
     """
 
     def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
-        """Join the errors to one message, whose example mends them all."""
+        """Join the errors into one message, whose example supplies everything."""
         self.gaps, self.proposed = tuple(gaps), dict(proposed or {})
         (first, *more) = self.gaps
         if not more:
@@ -64,15 +66,15 @@ class GapsError(LogError):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The options that tell all of it, each once, as a shell takes them."""
+        """Return the options that supply everything, each once, quoted for a shell."""
         return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
 
 
 def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> list[MotionReading]:
-    """Read channels without a role as force and motion, as far as names leave these open.
+    """Read channels without a role as force and motion, where names leave these open.
 
-    Returns the best reading, and behind it those that explain the force about as well; [] where nothing is open, or
-    where no reading explains it.
+    Returns the best reading, then others that explain the force about as well; [] if nothing is open, or if no reading
+    explains the force.
     """
     settings = LogSettings.current()
     chosen, rivals = proposal.chosen, proposal.rivals
@@ -81,7 +83,7 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     taken = [choice.channel for choice in chosen.values()]
 
     def candidates(role: str) -> list[Channel]:
-        """The channels that may have a role: the one that has it, its rivals, or those that fit it."""
+        """Return the candidates for a role: its channel, its rivals, or the channels that fit it."""
         if role in chosen:
             return [chosen[role].channel]
         every = rivals.get(role) or [channel for channel, _ in _fitting(role, table, taken)]
@@ -100,9 +102,9 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
 def check_gaps(
     reading: Reading, proposal: Proposal, needed: Sequence[str], readings: Sequence[MotionReading] = ()
 ) -> None:
-    """Check that all is told before a log can be read as one with the roles that are `needed`.
+    """Check that a log can be read as one with the roles that are `needed`.
 
-    `readings` are those of its channels by mechanics. Raises GapsError for all that is not, at once.
+    `readings` are readings of its channels by mechanics. Raises GapsError with everything that is missing.
     """
     table, origin = reading.table, reading.origin
     named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
@@ -148,9 +150,9 @@ def check_gaps(
 def _by_mechanics(
     role: str, readings: Sequence[MotionReading], channels: Sequence[Channel]
 ) -> tuple[Channel | None, str] | None:
-    """Return the channel that mechanics suggests for a role, and why; None if it says nothing.
+    """Return the channel that mechanics suggests for a role, and the reason; None if it suggests nothing.
 
-    The channel is None if two readings are about as good.
+    The channel is None if two readings are about equally good.
     """
     named = {channel.name: channel for one in readings if (channel := one.channel(role)) is not None}
     if not named:
@@ -168,7 +170,7 @@ def _by_mechanics(
 
 
 def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, AssignedRole]) -> list[LogError]:
-    """Return the gaps of units by role; where an axis turns, a torque needs no scale to newtons."""
+    """Return missing units by role; on a rotary axis a torque needs no scale to newtons."""
     gaps = {role: gap for role, gap in units.items() if gap is not None}
     if any(TURNS in gap.example for gap in gaps.values()):
         turned = ROTARY.unit(FORCE)
@@ -181,10 +183,10 @@ def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, Assigne
 
 
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
-    """Return the channel that fits a role best, and why if it is one of several alike.
+    """Return the channel that fits a role best, and the reason if several are alike; None if no channel fits.
 
-    It fits by unit and first letter, among channels that change and have no other role. No force follows the position,
-    as a reference does. None if no channel fits.
+    It fits by unit and first letter, among channels that change and have no other role. A force never follows the
+    position, as a reference does.
     """
     fits = _fitting(role, table, taken.values())
     if role == "force":
@@ -198,9 +200,9 @@ def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> 
 
 
 def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
-    """Return the channels that may have a role, and how well they fit it, the best first.
+    """Return the candidates for a role, with the quality of their fit, the best first.
 
-    They fit by having as many samples as most have, and by what they are.
+    They must have as many samples as most channels.
     """
     used = {id(channel) for channel in taken}
     usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
@@ -221,15 +223,15 @@ def _kinds(role: str) -> tuple[str, ...]:
 
 
 def _is_of_another(role: str, unit: str) -> bool:
-    """Tell whether a unit belongs to another quantity that no scale converts: rpm of a position."""
+    """Tell whether a unit belongs to another quantity that no scale converts, such as rpm for a position."""
     others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Choose the measured one among channels that move like the best candidate, and say why.
+    """Choose the measured one among channels that move like the best candidate, with the reason.
 
-    It is the only one whose name says that it was measured, or the noisiest. None if that cannot be decided.
+    It is the only one whose name says that it was measured, or the noisiest. Returns None if that cannot be decided.
     """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role not in KINDS or len(alike) == 1:
@@ -265,19 +267,17 @@ def _are_alike(one: Channel, other: Channel) -> bool:
 
 
 def _noise(channel: Channel) -> float:
-    """Return the noise of a channel relative to its range, by its fourth differences.
-
-    Little of a motion is left in them.
-    """
+    """Return the noise of a channel relative to its range, by its fourth differences, which hardly contain motion."""
     finite = channel.values[np.isfinite(channel.values)]
     with np.errstate(all="ignore"):
         return float(np.std(np.diff(finite, 4)) / np.ptp(finite))
 
 
 def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
-    """Return how well a channel fits a role.
+    """Return how well a channel fits a role, as a tuple to compare.
 
-    It changes, and not as a clock does; its unit, whether it is what was wanted, and its first letter count.
+    It counts whether the channel changes (but not as a clock does), its unit, whether it was commanded or measured, and
+    its first letter.
     """
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0) and not is_ramp(channel)
@@ -288,7 +288,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
-    """Return what has to be told of the instants of channels."""
+    """Return the missing information on the instants of channels."""
     if "time" in proposal.rivals:
         return []
     for choice in choices:

@@ -1,4 +1,4 @@
-"""The position of a log that holds the velocity alone: its integral."""
+"""Integrate the velocity of a log that has no position."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ NOTE = (
     "position: the integral of the velocity, since no channel holds one; where the log begins counts as 0, after a gap "
     "as well, an offset of the velocity becomes a drift, and the first micrometres of a motion are not resolved"
 )
-"""What to know of such a position."""
+"""Note on a position that is the integral of the velocity."""
 
 LENGTHS = ("m", "rad")
-"""Units of which that of a position is."""
+"""Units of a position."""
 
 
 def is_needed(
     table: ChannelTable, proposal: Proposal, needed: Sequence[str], best: MotionReading | None = None
 ) -> bool:
-    """Tell whether the position that is needed has to be the integral of the velocity.
+    """Tell whether a needed position must be the integral of the velocity.
 
-    No channel has that role or could have it, unless the user assigned the velocity and no position, or the
-    `best` reading by mechanics has a velocity.
+    No channel has that role or could have it, unless the user assigned the velocity and no position, or the `best`
+    reading by mechanics has a velocity.
     """
     velocity = proposal.chosen.get("velocity")
     if "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:

@@ -1,4 +1,4 @@
-"""Several logs of one event each as one log with gaps between them."""
+"""Join several logs of one event each into one log with gaps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def joinable(one: Log, other: Log) -> bool:
 
 
 def join_logs(logs: Sequence[Log]) -> Log:
-    """Join logs that are `joinable`, each after a gap of a second behind the one before."""
+    """Join `joinable` logs, each a second after the end of the previous one."""
     first = logs[0]
     times, segments, start, end = [], [], 0, 0.0
     for log in logs:
@@ -43,7 +43,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
 
 
 def join_alike(logs: Sequence[Log]) -> list[Log]:
-    """Return the logs, those that are alike joined."""
+    """Return the logs, with joinable ones joined."""
     groups: list[list[Log]] = []
     for log in logs:
         alike = next((group for group in groups if joinable(group[0], log)), None)

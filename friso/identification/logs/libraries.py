@@ -1,4 +1,4 @@
-"""Formats that are read by libraries installed on demand: what their readers share."""
+"""Shared parts of readers that use optional libraries."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.platform.extras import install, is_installed
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
     """Read a file of a kind by a library.
 
-    Raises LogError, which says how to install the library if it is not there.
+    Raises LogError, which says how to install a missing library.
     """
     if not is_installed(library):
         actual = f"a {kind} file, and the library {library} is not installed"
@@ -25,7 +25,7 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Say which channels hold fewer samples than their file states, because it was cut short."""
+    """Return a line on channels with fewer samples than their truncated file states."""
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)

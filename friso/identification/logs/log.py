@@ -1,4 +1,4 @@
-"""The log: what was measured, by role, in SI units, on one even time base."""
+"""Define the log: measured signals by role, in SI units, on one even time base."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ ROLES: Mapping[str, str] = {
     "cart_position": "m",
     "relative_position": "m",
 }
-"""Roles a channel can have, and the SI unit of each on a linear axis. `position` and `velocity` are the stage's (the
-body that is controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is
-the actuator's, from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output
-contained in it."""
+"""Roles of channels, with the SI unit of each on a linear axis. `position` and `velocity` are those of the stage (the
+controlled body), `cart_position` that of the cart; `relative_position` is position minus cart position; `force` is
+the actuator's, from a current or a voltage by a scale, including any `disturbance` that is added to the controller's
+output."""
 
 
 @dataclass(frozen=True)
 class Log:
-    """What was measured, by role (see `ROLES`): SI signals at `time` [s], all of shape (n,).
+    """Measured signals by role (see `ROLES`): SI values at `time` [s], all of shape (n,).
 
-    On a rotary `axis` angles stand for lengths and torques for forces, under the units of a linear axis. Samples are
-    `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds the unit of each
-    role whose channel could not be converted to SI (a force in volts without a scale, an angle instead of a length).
+    On a rotary `axis` angles replace lengths and torques replace forces, under the units of a linear axis. Samples are
+    `sample_time` [s] apart within each of the `segments`, which are separated by gaps. `units` has the unit of each
+    role whose channel could not be converted to SI (a force in volts without a scale).
 
-    `scalars` are single numbers from the file, by name. `read` lists line by line what was read and how, `warnings`
-    what the engineer should know before believing it. `setup` are keys of the stage file that had other values while
-    this log was taken ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks samples that were lost and are
-    interpolated; None if there are none. `is_excerpt` marks a part of a longer log.
+    `scalars` are single numbers from the file, by name. `read` lists what was read and how, `warnings` what the
+    engineer should know before trusting it. `setup` are keys of the stage file that had other values for this log
+    ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks lost samples that are interpolated; None without any.
+    `is_excerpt` marks a part of a longer log.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Log:
 
     @property
     def longest(self) -> slice:
-        """The longest stretch without gaps."""
+        """Return the longest stretch without gaps."""
         return max(self.segments, key=lambda part: part.stop - part.start)
 
     def measured(self, part: slice) -> np.ndarray:
@@ -71,9 +71,9 @@ class Log:
         return np.ones(part.stop - part.start) if self.bridged is None else 1.0 - self.bridged[part]
 
     def excerpt(self, count: int) -> Log:
-        """Return at most so many samples of the longest stretch without gaps.
+        """Return at most so many samples of the longest stretch without gaps: those with the longest travel.
 
-        They are those in which the position goes the longest way; the whole log where that stretch is no longer.
+        If the stretch is no longer than that, the whole log is returned.
         """
         part = self.longest
         if part.stop - part.start <= count:
@@ -95,5 +95,5 @@ class Log:
         return replace(self, axis=self.axis.per(unit), units=units)
 
     def unit(self, role: str) -> str:
-        """Return the unit in which a role stands, that of a linear axis where it is the role's."""
+        """Return the unit of a role's signal: the linear-axis unit, unless it could not be converted."""
         return self.units.get(role, ROLES[role])

@@ -1,4 +1,4 @@
-"""What the user said of a log: which channel is what, in which unit; kept in a file beside the log."""
+"""Store the user's statements about a log, such as channels of roles and their units, in a file beside the log."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from friso.stage.files import parsed, text_of
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
-"""What a channel can be mapped to."""
+"""Names to which a channel can be mapped."""
 TABLES = ("roles", "units", "scales", "setup")
 _INTERVALS = Bound("1 ns to 1 h", lambda value: (value >= 1e-9) & (value <= 3600))
 _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
@@ -30,11 +30,11 @@ _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 
 @dataclass(frozen=True)
 class Mapping:
-    """What the user said of a log: which channel is what, in which unit.
+    """The user's statements about a log.
 
-    It has roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time
-    [s] where the file states none, and the kind of experiment and of axis where the user named them; `setup` says how
-    the stage was set up for this log, otherwise than in its file ({dotted key: "8 mm"}).
+    They are roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time
+    [s] if the file states none, and the kinds of experiment and axis; `setup` has the keys with which the stage was set
+    up differently for this log ({dotted key: "8 mm"}).
     """
 
     roles: Table[str, str] = field(default_factory=dict)
@@ -47,11 +47,11 @@ class Mapping:
 
     @property
     def axis_kind(self) -> AxisKind:
-        """The kind of axis: linear unless the user said otherwise."""
+        """Return the kind of axis: linear unless the user said otherwise."""
         return LINEAR if self.axis is None else KINDS[self.axis]
 
     def over(self, older: Mapping) -> Mapping:
-        """Return this mapping, completed by an older one where this one is silent."""
+        """Return this mapping, completed by an older one."""
         rest = older.beside(self)
         return Mapping(
             {**rest.roles, **self.roles},
@@ -64,10 +64,10 @@ class Mapping:
         )
 
     def beside(self, newer: Mapping) -> Mapping:
-        """Return what this mapping says about which a newer one is silent.
+        """Return the statements of this mapping that a newer one does not replace.
 
-        A sample time is silenced by a channel of times or the unit of one, a channel of times by a sample time, a
-        scale by another channel for its role, and a role by another role for its channel.
+        A sample time is replaced by a channel of times or its unit, a channel of times by a sample time, a scale by
+        another channel for its role, and a role by another role for its channel.
         """
         timed = "time" in newer.roles or any((role_of(name) or ("",))[0] == "time" for name in newer.units)
         used = {*newer.roles.values()}
@@ -87,7 +87,7 @@ class Mapping:
         )
 
     def replaced_by(self, newer: Mapping) -> str:
-        """Say which roles and units of this mapping a newer one contradicts; "" for none."""
+        """Return which roles and units of this mapping a newer one contradicts, in words; "" for none."""
         used = {name: role for role, name in newer.roles.items()}
         roles = [
             f"{role} is {name}"
@@ -99,7 +99,7 @@ class Mapping:
 
     @property
     def words(self) -> str:
-        """What the mapping says, in words; "" for nothing."""
+        """Return the mapping in words; "" if it is empty."""
         time = [] if self.sample_time is None else [f"one sample every {self.sample_time:.6g} s"]
         kinds = [text for text in (self.experiment, self.axis) if text is not None]
         roles = [f"{role} is {name}" for role, name in self.roles.items()]
@@ -160,20 +160,20 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """Say what an example assumes, and what that implies, to be checked before it is copied."""
+    """Return the assumption of an example, and its consequence, to be checked before the example is copied."""
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 
 def option(name: str, left: str, right: str) -> str:
-    """Write an option LEFT=RIGHT as a shell takes it."""
+    """Return an option LEFT=RIGHT quoted for a shell."""
     return f"{name} {shell_word(f'{left}={right}')}"
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:
-    """Return where the mapping of a log is kept: beside it, or in a folder.
+    """Return the file for the mapping of a log: beside the log, or in a folder.
 
-    In a folder, logs of one name from several folders, and those whose long names begin alike, have places of their
-    own.
+    In a folder, logs with equal names from several folders, and those whose long names begin alike, have separate
+    files.
     """
     settings = LogSettings.current()
     if folder is None:
@@ -186,7 +186,7 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
 
 
 def mapping_text(mapping: Mapping) -> str:
-    """Write a mapping as it is kept beside a log."""
+    """Return the text of a mapping file."""
     lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
     if mapping.sample_time is not None:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
@@ -202,9 +202,9 @@ def mapping_text(mapping: Mapping) -> str:
 
 
 def place_for(log: Path, folder: Path) -> Path:
-    """Return where a log's mapping can be kept: beside it, or in the folder if not.
+    """Return a writable place for a log's mapping: beside it, or else the folder.
 
-    It cannot be kept in a read-only folder, which counts as such even for a superuser.
+    A read-only folder counts as such even for a superuser.
     """
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
@@ -212,7 +212,7 @@ def place_for(log: Path, folder: Path) -> Path:
 
 
 def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
-    """Load the mapping kept beside a log, or else in the folder; None if there is none.
+    """Load the mapping beside a log, or else in the folder; None without one.
 
     Raises LogError for a file that is not a mapping.
     """
@@ -256,7 +256,7 @@ def _parsed(place: Path) -> Mapping:
 
 
 def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
-    """Check a table of texts; the set-up may have plain numbers and truths as well.
+    """Check a table of texts; the set-up may also have numbers and booleans.
 
     Raises LogError.
     """

@@ -1,4 +1,4 @@
-"""Frequency responses as somebody else measured them, and how columns of a table are one."""
+"""Read frequency responses from another instrument, given as columns of a table."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from friso.identification.logs.word_lists import channel_words
 from friso.quantities import Quantity, any_sign
 
 _KEYS = channel_words()["response"]
-"""Words in a heading that tell what a column is."""
+"""Words in headings that identify the columns of a response."""
 
 
 @dataclass(frozen=True)
 class MeasuredResponse:
-    """A frequency response as somebody measured it, at rising frequencies [Hz].
+    """A frequency response from another instrument, at rising frequencies [Hz].
 
-    Complex values, and coherence or None, have the shape (n,). `unit` is what the values are in, SI where the file
-    states a unit, "" where it states none.
+    Complex values, and coherence or None, have the shape (n,). `unit` is that of the values: SI if the file states a
+    unit, "" if it states none.
     """
 
     frequency: np.ndarray
@@ -38,9 +38,9 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """Return what a heading says that its column is; None for nothing of a response.
+    """Return the kind of a column by its heading; None if it is no part of a response.
 
-    What stands in front of brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
+    Text before brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
     """
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
     shown = (set(words(text)) for text in (re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name), name))
@@ -48,9 +48,9 @@ def column_kind(name: str) -> str | None:
 
 
 def is_response(names: Iterable[str]) -> bool:
-    """Tell whether headings hold a frequency response.
+    """Tell whether headings describe a frequency response.
 
-    It has a frequency with magnitude and phase, or with real and imaginary part.
+    They have a frequency, and magnitude with phase or real with imaginary part.
     """
     kinds = {column_kind(name) for name in names}
     return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
@@ -131,7 +131,7 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
 
 
 def response_unit(text: str) -> tuple[float, str, str]:
-    """Return the factor to SI, the SI unit, and a description; unknown kinds of unit stay."""
+    """Return the factor to SI, the SI unit, and a description; unknown units are kept."""
     text = spelled(text)
     for si in (*RESPONSES, "m"):
         if text and unit_factor(text, si) is not None:
@@ -168,7 +168,7 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
 
 
 def _of_position(measured: MeasuredResponse) -> MeasuredResponse:
-    """Return a response as one of position, if velocity or acceleration was measured."""
+    """Return a response of velocity or acceleration as one of position."""
     rate = re.fullmatch(r"(?P<place>m|rad)/s(?P<twice>\^2)?/(?P<force>.+)", measured.unit)
     if rate is None:
         return measured

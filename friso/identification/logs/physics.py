@@ -1,8 +1,8 @@
-"""Which channels are force and motion by mechanics: a force is what accelerates a mass and overcomes its friction.
+"""Find force and motion among channels by mechanics: a force accelerates a mass and overcomes its friction.
 
-Each pair of channels is read as a force and a position, and as a force and a velocity: force = M a + F_v v +
-F_c sign(v) + offset is fitted to it at several time scales, without units, since a factor changes nothing. In the right
-reading little of the force is left on any scale, and inertia and friction have the same sign.
+Each pair of channels is read as force and position, and as force and velocity: force = M a + F_v v + F_c sign(v) +
+offset is fitted at several time scales, without units, because a factor changes nothing. In the right reading little of
+the force is left on any scale, and inertia and friction have equal signs.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from friso.identification.logs.checks import rises_evenly
 from friso.identification.logs.settings import LogSettings
 
 KINDS = ("position", "velocity")
-"""What a channel of the motion can be, with the number of derivatives that lead from it to a velocity."""
+"""Kinds of motion channels, with the number of derivatives that lead to a velocity."""
 
 
 @dataclass(frozen=True)
 class MotionReading:
     """Two channels read as a force and the motion that it causes.
 
-    `kind` says whether the motion is a position or a velocity. `unexplained` is the share of the force's variance that
-    inertia and friction leave, the mean over time scales; 1 if their signs contradict each other. `sign` is -1 if the
-    force acts against the motion that it causes. `doubt` is 1 if the force goes with the acceleration alone, 2 if it
-    goes with the velocity alone at some time scale, and 4 more if the sign is -1.
+    `kind` tells whether the motion is a position or a velocity. `unexplained` is the fraction of the force's variance
+    that inertia and friction leave, the mean over time scales; 1 if their signs contradict each other. `sign` is -1 if
+    the force acts against the motion. `doubt` is 1 if the force is proportional to the acceleration alone, 2 if it is
+    proportional to the velocity alone at some time scale, and 4 more if the sign is -1.
     """
 
     force: Channel
@@ -46,10 +46,10 @@ class MotionReading:
 
 
 def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, str]]) -> list[MotionReading]:
-    """Read every force with every motion, each a channel and what it is, the best reading first.
+    """Read every force with every motion, each a channel and its kind, the best reading first.
 
-    Readings that mechanics refutes come last. Before them come those in which the force pushes against the motion, or
-    is proportional to the velocity or the acceleration: the one may be the reference or the derivative of the other.
+    Readings that mechanics refutes come last. Before them come those in which the force opposes the motion, or is
+    proportional to velocity or acceleration alone: one may be the reference or the derivative of the other.
     """
     signals = {id(channel): _filled(channel) for channel in (*forces, *(motion for motion, _ in motions))}
     readings = []
@@ -77,7 +77,7 @@ def is_counter(channel: Channel) -> bool:
 
 
 def leads(one: Channel, other: Channel) -> bool:
-    """Tell whether a channel leads another that moves alike, as a reference does.
+    """Tell whether a channel leads another with a similar motion, as a reference does.
 
     Their velocities correlate best if the other is shifted back by a sample or more, up to a tenth of the record.
     """
@@ -105,7 +105,7 @@ def _filled(channel: Channel) -> np.ndarray | None:
 
 
 def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, moved: np.ndarray) -> MotionReading:
-    """Fit inertia and friction to a pair of channels, at one time scale after the other."""
+    """Fit inertia and friction to a pair of channels, at several time scales."""
     settings = LogSettings.current()
     rows = []
     while len(values) >= settings.samples_of_a_reading:
@@ -123,10 +123,10 @@ def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, mov
 
 
 def _fitted(values: np.ndarray, moved: np.ndarray, kind: str) -> tuple[float, float, float, float] | None:
-    """Fit one time scale; None where hardly anything moves.
+    """Fit one time scale; None if hardly anything moves.
 
-    Returns the share of the variance that is left, the size of inertia and of friction with their signs, and how much
-    the force correlates with the velocity.
+    Returns the remaining fraction of the variance, the sizes of inertia and friction with their signs, and the
+    correlation of the force with the velocity.
     """
     settings = LogSettings.current()
     width, order = settings.samples_of_a_scale, 1 - KINDS.index(kind)

@@ -1,4 +1,4 @@
-"""What the lines above a table tell of it: the sampling interval, and the units of its columns."""
+"""Read the lines above a table: the sampling interval, and the units of its columns."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from friso.identification.logs.units import is_unit, split_heading, unit_factor
 from friso.identification.logs.word_lists import channel_words
 
 RATES, STEPS = (channel_words()[name] for name in ("sample_rate", "sample_time"))
-"""What a sample rate and a sample time are called, in small letters without what stands between them."""
+"""Names of a sample rate and of a sample time, in lower case without separators."""
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
-"""What stands around a key and its value, and is no part of them."""
+"""Characters around a key and its value that belong to neither."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
-"""Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
+"""Pattern of digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Preamble:
-    """What the lines above a table tell of it.
+    """Information from the lines above a table.
 
-    It has the sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by
-    the name of the column; and what was read, a line each.
+    It has the sampling `interval` [s], if a line states it with its unit; numbers without a unit by name; units by the
+    name of the column; and lines about what was read.
     """
 
     interval: float | None = None
@@ -37,9 +37,9 @@ class Preamble:
 
 
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
-    """Read what the lines above a table with columns of these names tell.
+    """Read the lines above a table with columns of the given names.
 
-    Intervals that contradict each other are none.
+    Contradicting intervals are dropped.
     """
     settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]
@@ -115,7 +115,7 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
 
 
 def _horizontal(lines: Iterable[str]) -> str:
-    """Return the unit of the first column of a scope's table, where a line tells it."""
+    """Return the unit of the first column of a scope's table, if a line states it."""
     pairs = [pair for line in lines if (pair := _pair(line))]
     return next((value.split(",")[0] for key, value in pairs if key.lower() in ("horizontal units", "x units")), "")
 

@@ -1,4 +1,4 @@
-"""Reading a file by what is in it, not by its name: every format ends in the same table of channels."""
+"""Read a file by its content, not by its name; every format gives a table of channels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _OTHERS = {
     b"#ROSBAG": ("a bag of ROS", "one of its topics saved as CSV"),
     b"SQLite format 3": ("a data base of SQLite, as a bag of ROS 2 is", "one of its topics saved as CSV"),
 }
-"""What files of other kinds begin with, what they are, and what is wanted instead."""
+"""First bytes of files of other kinds, with their names and the files to use instead."""
 
 
 def file_format(path: Path) -> str:
@@ -70,7 +70,7 @@ def read_table(path: Path | str) -> ChannelTable:
 
 
 def is_frequency_response(path: Path | str) -> bool:
-    """Tell whether a file holds a frequency response instead of signals over time.
+    """Tell whether a file has a frequency response instead of signals over time.
 
     Raises LogError as `file_format`.
     """

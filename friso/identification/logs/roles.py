@@ -1,4 +1,4 @@
-"""Which channel is what: as the user says, else proposed by name or unit with a reason, never guessed between two."""
+"""Assign roles to channels: by the user, or proposed by name or unit with a reason, never guessed between two."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _KEYS, _CURRENTS, _OTHERS_WANTED, MEASURED = (
 )
 
 _LETTERS = frozenset("vfinw")
-"""Symbols of what may be wanted and is no position, directly before the word of what is wanted: v_soll."""
+"""Letters of commanded quantities other than a position, directly before the word for commanded: v_soll."""
 
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
-"""Units that tell a role where a single channel without one has them."""
+"""Units that imply a role if a single channel without a role has them."""
 
 _RATES = ("m/s", "rad/s", "m/s^2", "rad/s^2")
-"""Units in which nothing is a position, whatever its name."""
+"""Units that exclude a position, whatever the name."""
 
 _NEVER_WANTED = (*_RATES, "N", "N*m", "A")
-"""Units in which what was wanted is no position."""
+"""Units that exclude a commanded position."""
 
 _SYMBOLS = {
     "v": ("velocity", ("m/s", "rad/s")),
@@ -43,24 +43,24 @@ _SYMBOLS = {
     "m": ("force", ("N*m",)),
     "i": ("force", ("A",)),
 }
-"""Symbols whose unit tells that they are no names of axes, with their role, directly before the word of what is:
-v_ist in mm/s."""
+"""Symbols that name a quantity rather than an axis, by their unit, with their role, directly before the word for
+measured: v_ist in mm/s."""
 
 _FIRST_LETTERS = {"F": "fbk", "R": "ref", "C": "cmd"}
-"""What the first letters of FPOS, RPOS, CPOS and their like mean to motion controllers. APOS is a reference in those of
-ACS and measured in others: it says nothing."""
+"""Meaning of the first letters of FPOS, RPOS, CPOS and similar names in motion controllers. APOS is a reference at ACS
+and measured elsewhere, so it is left out."""
 
 _GERMAN = re.compile(
     r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?"
     r"|(?:motor|antriebs?)(?P<of_motor>strom|kraft|drehmoment)"
 )
-"""Names that begin with what is wanted or what is, or end with it, and those of a motor's channels: Sollposition,
+"""German compounds with the word for commanded or measured at either end, and names of motor channels: Sollposition,
 Istposition, Lagesollwert, Motorstrom."""
 
 
 @dataclass(frozen=True)
 class AssignedRole:
-    """A channel for a role and why; `by_user` where the user assigned it."""
+    """A channel for a role with the reason; `by_user` if the user assigned it."""
 
     role: str
     channel: Channel
@@ -88,7 +88,7 @@ def _compound(word: str) -> list[str]:
 
 
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
-    """Return the role that a name stands for, and the word that shows it; None for neither.
+    """Return the role of a name, and the word that shows it; None if it shows none.
 
     The `unit` distinguishes a symbol from the name of an axis: V_soll in mm, v_ist in mm/s.
     """
@@ -126,7 +126,7 @@ def wanted_of(name: str, unit: str = "") -> bool:
 def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
     """Return role and letter of a name like v_ist, in a fitting unit; else None.
 
-    It consists of a symbol and a word for measured values.
+    The name consists of a symbol and a word for measured values.
     """
     if len(parts) != 2 or parts[0] not in _SYMBOLS or parts[1] not in MEASURED or not unit:
         return None
@@ -140,18 +140,18 @@ def _has_unit_of(unit: str, kinds: Sequence[str]) -> bool:
 
 
 def _is_symbol(parts: Sequence[str], unit: str) -> bool:
-    """Tell whether a name is a symbol of something other than a position, and commanded: v_soll."""
+    """Tell whether a name is a symbol of a commanded quantity other than a position: v_soll."""
     of_position = _has_unit_of(unit, _TOLD_BY_UNIT["position"])
     return len(parts) > 1 and parts[0] in _LETTERS and parts[1] in _SET and not of_position
 
 
 def is_wanted(name: str) -> bool:
-    """Tell whether a name says, or hints, that the value was commanded, not measured."""
+    """Tell whether a name says, or suggests, that the value was commanded, not measured."""
     return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
 
 
 def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:
-    """Find the channel of a name, with or without its unit in brackets.
+    """Find the channel with a name, with or without its unit in brackets.
 
     Raises LogError that lists the channels.
     """
@@ -165,9 +165,9 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
 
 
 def _nearest(table: ChannelTable, name: str, role: str) -> str:
-    """Return the name of the channel that is likely meant by a misspelled one.
+    """Return the name of the channel that a misspelled name probably means.
 
-    Channels of the role come first, then all that are no clock.
+    Channels of the role come first, then all others except clocks.
     """
     meant = {channel.name: (role_of(channel.name) or ("",))[0] for channel in table.channels}
     fitting = [one for one, its in meant.items() if its == role] or [one for one, its in meant.items() if its != "time"]
@@ -177,9 +177,9 @@ def _nearest(table: ChannelTable, name: str, role: str) -> str:
 
 
 def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
-    """List the channels for a message, without those `taken` for other roles.
+    """Return a list of the channels for a message, without those `taken` for other roles.
 
-    It also says what was left out as objects.
+    It also names what was left out as objects.
     """
     used = {id(channel) for channel in taken}
     labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels if id(c) not in used]
@@ -197,9 +197,9 @@ class Proposal:
 
 
 def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
-    """Give roles to channels: as the user assigned them, then by their names, then by units.
+    """Give roles to channels: as the user assigned them, then by names, then by units.
 
-    Of several channels whose names show a role, the one whose name is nothing else gets it. Raises LogError for an
+    Of several channels whose names show a role, the one whose name has no other word gets it. Raises LogError for an
     assigned name that is not there.
     """
     chosen = {
@@ -242,7 +242,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
 
 
 def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
-    """Return the only channel in a unit of the role whose name says nothing; None otherwise."""
+    """Return the only channel in a unit of the role whose name says nothing, or None."""
     used = {id(channel) for channel in taken}
     fits = [
         channel
@@ -266,7 +266,7 @@ def of_no_signal(name: str) -> bool:
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Return the only candidate whose name is the role, or is the word for it alone."""
+    """Return the only candidate whose name is exactly the role or its word, or None."""
     if len(matches) < 2:
         return None
     for alone in (
@@ -279,6 +279,6 @@ def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, 
 
 
 def _own_times(table: ChannelTable) -> bool:
-    """Tell whether the channels that are not times themselves have their instants from the file."""
+    """Tell whether channels other than time channels have instants from the file."""
     others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
     return any(channel.time is not None for channel in others)

@@ -1,4 +1,4 @@
-"""A channel that has a role: its instants in seconds and its values in the unit of the role."""
+"""Convert a channel with a role: instants in seconds, values in the unit of the role."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from friso.quantities import quoted
 SPEED = ROLES["velocity"]
 
 TURNS = f"--axis {ROTARY.name}"
-"""The option that tells a rotary axis."""
+"""The option for a rotary axis."""
 
 
 @dataclass
 class Notes:
-    """Lines gathered on the way to a log, and the units that are not those of the roles."""
+    """Lines about a log, and units that differ from those of the roles, collected while it is read."""
 
     read: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -39,10 +39,10 @@ class Notes:
 
 @dataclass(frozen=True)
 class Reading:
-    """How channels are read: the table, what the user said, and what will do.
+    """Rules for reading channels: the table, the user's mapping, and the accepted units.
 
-    `strict`: only the units of the roles will do; `bare`: the file is of a kind that cannot hold units; `origin` is
-    where it lies, and `foreign` are roles that may have a foreign unit all the same (a force in volts).
+    `strict`: only the units of the roles are accepted; `bare`: the file is of a kind without units; `origin` is the
+    path, and `foreign` are roles that may have another unit all the same (a force in volts).
     """
 
     table: ChannelTable
@@ -57,14 +57,14 @@ class Reading:
         return self.mapping.axis_kind.unit(ROLES[role])
 
     def takes(self, role: str, si: str) -> bool:
-        """Tell whether a signal of a role may stand in a unit that is not the role's."""
+        """Tell whether a signal of a role may have a unit that is not the role's."""
         return si == self.unit(role) or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
-    """Return the table with the user's units, and with the times that follow from them.
+    """Return the table with the user's units, and with times derived from time columns.
 
-    Times follow where the format has no `times` of its own. Raises LogError.
+    Times are derived if the format has no `times` of its own. Raises LogError.
     """
     if not mapping.units:
         return table
@@ -83,7 +83,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
 
 
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
-    """Return the values of a channel in the unit of its role, with notes on what was done.
+    """Return the values of a channel in the unit of its role, and add notes on the conversion.
 
     Raises LogError.
     """
@@ -132,7 +132,7 @@ def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, 
 
 
 def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
-    """Return what is needed to convert a channel to the unit of its role; None if nothing is.
+    """Return the error that names what a conversion to the unit of the role needs; None if it needs nothing.
 
     Raises LogError for a scale that does not fit.
     """
@@ -146,16 +146,16 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 
 
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
-    """Tell whether a channel without a unit counts as one in SI.
+    """Tell whether a channel without a unit is taken as SI.
 
-    The user assigned it, the format holds no units, and it is no current for a force.
+    The user assigned it, the format has no units, and it is no current in place of a force.
     """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)
 
 
 def _electric_unit(choice: AssignedRole) -> str:
-    """Return A or V, where the name of a channel for a force tells it; "" else."""
+    """Return A or V if the name of a channel for a force implies it, else ""."""
     unit = likely_unit(words(choice.channel.name)) if choice.role == "force" else ""
     return unit if unit in ("A", "V") else ""
 
@@ -192,8 +192,8 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
 def _likely_length(channel: Channel, wanted: str) -> tuple[str, str]:
     """Return the likely unit of a position or velocity, and its range in words in that unit.
 
-    A travel is between 0.5 mm and 0.5 m, or nearest to that, and a speed between 5 mm/s and 5 m/s. Other quantities
-    keep the unit `wanted`.
+    A travel between 0.5 mm and 0.5 m is likely, and a speed between 5 mm/s and 5 m/s. Other quantities keep the unit
+    `wanted`.
     """
     most = {LENGTH: 0.5, SPEED: 5.0}.get(wanted)
     if most is None:
@@ -207,15 +207,15 @@ def _likely_length(channel: Channel, wanted: str) -> tuple[str, str]:
 
 
 def _span(values: np.ndarray) -> str:
-    """Say between which values a channel runs."""
+    """Return the range of a channel in words."""
     finite = values[np.isfinite(values)]
     return f" and runs from {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
-    """Return the instants of a channel [s].
+    """Return the instants of a channel [s] from the user's sample time, a time channel, or the file; None without any.
 
-    They come from the user's sample time, a time channel, or the file. None if there are none. Raises LogError.
+    Raises LogError.
     """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
@@ -250,10 +250,7 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
 
 
 def _likely_unit(clock: Channel) -> tuple[str, str]:
-    """Return the unit in which a time channel's steps are typical of logs, and the step.
-
-    The step is in words. Typical steps are between 0.1 ms and 100 ms.
-    """
+    """Return the unit in which a time channel's steps are typical of logs (0.1 ms to 100 ms), and the step in words."""
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     unit, size = ("s", 1e3) if step <= 0.1 else ("ms", 1.0) if step <= 100 else ("us", 1e-3)
@@ -281,15 +278,12 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
 
 
 def _may_be_a_clock(channel: Channel) -> bool:
-    """Tell whether a channel may be a clock: in a unit of time and rising, or without and even.
-
-    A counter is no clock.
-    """
+    """Tell whether a channel may be a clock: rising in a unit of time, or even without a unit, but no counter."""
     return is_clock(channel) or (not channel.unit and is_ramp(channel) and not is_counter(channel))
 
 
 def _offers(table: ChannelTable) -> str:
-    """Say what single numbers in the file could mean for the sample time: offered, not used."""
+    """Return which single numbers in the file could be the sample time; they are not used."""
     offers = []
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower().replace("_", "")

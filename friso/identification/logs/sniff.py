@@ -1,4 +1,4 @@
-"""How a text file is written, found in its first lines: encoding, delimiter, decimal sign, where the numbers begin."""
+"""Find the layout of a text file from its first lines: encoding, delimiter, decimal sign, first row of numbers."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading
 
 REMEMBERED = 4
-"""Heads of files of which it is remembered how they are written: each is asked for several times."""
+"""Files whose layout is cached, because each is examined several times."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
-"""Delimiter and decimal sign; of two that fit equally well the first is taken."""
+"""Pairs of delimiter and decimal sign; of two that fit equally well the first is taken."""
 NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
 _NUMBER = re.compile(rf"[+-]?{NUMBER}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
 CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,:](\d+))?)?(?: ?([AaPp])\.?[Mm]\.?)?"
 """A time of day: hours, minutes, seconds, their fraction, and the half of the day."""
 _DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2}))"
 DOS_END = "\x1a"
-"""Ctrl-Z, with which programs of DOS end a text."""
+"""Ctrl-Z, with which DOS programs end a text."""
 ISO = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)?")
 STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
 """A date and time as in ISO 8601, or a time of day, behind a date or not."""
@@ -35,7 +35,7 @@ STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text is written.
+    """Layout of a text.
 
     `first` counts the lines before the numbers, `above`; `names` and `units` are per column; `exact`: every delimiter
     ends a cell, so that several spaces are empty cells.
@@ -54,7 +54,7 @@ class TextLayout:
 
     @property
     def in_words(self) -> str:
-        """The layout in words."""
+        """Return the layout in words."""
         names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
         return (
             f"delimiter {names[self.delimiter]}, decimal {'comma' if self.decimal == ',' else 'point'}, "
@@ -80,7 +80,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
 
 @lru_cache(REMEMBERED)
 def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
-    """Return encoding and lines of what a file begins with; None for what is no text."""
+    """Return encoding and lines of the beginning of a file; None if it is no text."""
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
     if not encoding and b"\0" in head:
         even, odd = head[0:4000:2].count(0), head[1:4000:2].count(0)
@@ -135,7 +135,7 @@ def is_number(cell: str, decimal: str) -> bool:
 def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
     """Tell whether cells, of which some are `numeric`, are a row of values.
 
-    Such a row has numbers, gaps and time stamps, with `words` also a few words (a state).
+    A row has numbers, gaps and time stamps, and with `words` a few words (a state).
     """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
@@ -146,9 +146,9 @@ def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) ->
 
 
 def layout(path: Path) -> TextLayout:
-    """Find how a text with one table of numbers is written.
+    """Find the layout of a text with one table of numbers.
 
-    Words stand in its rows only where hardly any row goes without. Raises LogError where there is none.
+    Words are accepted in its rows only if nearly all rows have some. Raises LogError if there is no table.
     """
     settings = LogSettings.current()
     encoding, lines = decoded_head(path)
@@ -191,7 +191,7 @@ def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
 
 
 _Fit = tuple[tuple[int, bool, int], TextLayout] | None
-"""A layout, and how well it fits: rows of numbers, a heading as long as they are, columns. None for no fit."""
+"""A layout with the quality of its fit: rows of numbers, whether the heading is as long, columns. None for no fit."""
 
 
 def _fits(
@@ -213,7 +213,7 @@ def _fits(
 def _fit(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
 ) -> _Fit:
-    """Return how well a delimiter and a decimal sign fit, with which these are rows of numbers."""
+    """Return the quality of a delimiter and a decimal sign, given which rows are numbers."""
     if not any(is_row):
         return None
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
@@ -225,10 +225,7 @@ def _fit(
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
-    """Tell whether a row of numbers is followed by one as long, as in a table.
-
-    A single number in the lines before a table is not.
-    """
+    """Tell whether a row of numbers is followed by one of equal length, as in a table."""
     following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
     if following is None or not any(is_row[i + 1 :]):
         return True
@@ -257,14 +254,14 @@ def _headings(
 
 
 def _filled(cells: list[str]) -> list[str]:
-    """Return the cells up to the last that is not empty."""
+    """Return the cells up to the last non-empty one."""
     return cells[: max((i + 1 for i, cell in enumerate(cells) if cell), default=0)]
 
 
 def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
     """Return the headings in a line.
 
-    Between spaces there may be names of several words, where each ends with its unit in brackets.
+    Names separated by spaces may have several words, if each ends with its unit in brackets.
     """
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:

@@ -71,8 +71,8 @@ def _such_as(cells: Any) -> str:
 def read_frame(path: Path, form: TextLayout) -> Any:
     """Read all cells from the first row of numbers on; columns without text are floats.
 
-    The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
-    Raises LogError.
+    The lines before are skipped here, because pandas would take a single quotation mark in them for an open one. Raises
+    LogError.
     """
     options: dict[str, Any] = {
         "header": None, "decimal": form.decimal,
@@ -96,7 +96,7 @@ def read_frame(path: Path, form: TextLayout) -> Any:
 
 
 class _WithoutDosEnd:
-    """A text without the mark with which programs of DOS end it."""
+    """A text file without the end mark of DOS programs."""
 
     def __init__(self, file: TextIO) -> None:
         """Wrap a text file."""
@@ -114,7 +114,7 @@ class _WithoutDosEnd:
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
     """Return the error for a line with too many cells, or an unclosed quotation mark.
 
-    It has the parser's own words if there is neither.
+    For other errors it has the parser's own words.
     """
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -128,7 +128,7 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
 
 
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
-    """Check that no row has fewer cells than columns above others that have them all.
+    """Check that no row lacks cells in complete columns.
 
     Raises LogError.
     """
@@ -146,10 +146,7 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Tell whether a comma stands anywhere after the first numbers of a file.
-
-    The head of the file showed whole numbers only.
-    """
+    """Tell whether a comma occurs anywhere after the first numbers of a file whose head has whole numbers only."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
         for _ in range(form.first):
@@ -187,7 +184,7 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
 def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
     """Return texts without the signs that group thousands: 12.345,67.
 
-    All have to be numbers written so, and one to have a decimal sign too.
+    All texts must be such numbers, and one must have a decimal sign too.
     """
     group = "." if decimal == "," else ","
     digits = rf"[+-]?(?:\d{{1,3}}(?:\{group}\d{{3}})*|\d+)"
@@ -199,7 +196,7 @@ def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
 
 
 def as_numbers(texts: Any) -> np.ndarray:
-    """Return texts as floats, NaN for what is no number."""
+    """Return texts as floats, NaN for other texts."""
     numbers: Any = pd.to_numeric(texts, errors="coerce")
     return numbers.to_numpy(dtype=float)
 
@@ -207,8 +204,8 @@ def as_numbers(texts: Any) -> np.ndarray:
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
     """Return the seconds since the first of some time stamps.
 
-    Of dates that are not as in ISO 8601, which may be of the day or of the month first, only the time of day counts;
-    one that steps back goes on the next day.
+    Of dates not in ISO 8601, in which day or month may come first, only the time of day counts; one that steps back
+    belongs to the next day.
     """
     texts = texts.str.replace(",", ".", regex=False)
     try:
@@ -239,7 +236,7 @@ def _time_of_day(texts: Any) -> np.ndarray:
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
     """Return the columns without the empty cells below their last value.
 
-    A cell that is missing at the end of a single row stays and is a NaN, which the checks report.
+    A single cell that is missing at the end of a row becomes NaN, which the checks report.
     """
     out = []
     for column in columns:
@@ -256,10 +253,10 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
 
 
 def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
-    """Give each column the instants of the time column to its left that is as long.
+    """Give each column the instants of the nearest time column to its left with equal length.
 
-    A file may have one per channel; where none stands to its left, it is the only one there is, which may go on where
-    the column has ended. A time column is one that says so and has its unit.
+    Without one to the left, the only time column of the file is used, which may be longer than the column. A time
+    column has a name and a unit of time.
     """
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name, c.unit) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]

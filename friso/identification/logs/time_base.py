@@ -1,4 +1,4 @@
-"""Instants of a channel: cleaned, split at gaps, even within each segment; channels of several rates on one base."""
+"""Make the instants of channels even within segments, split at gaps, and bring several rates to one base."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from friso.quantities import percent
 class Track:
     """A channel with even instants within each segment.
 
-    `time` [s] and `values` have the shape (n,), those that were lost and `bridged` are true in an array of that shape;
-    `read` and `warnings` say what was done to it.
+    `time` [s] and `values` have the shape (n,), and `bridged` marks lost samples; `read` and `warnings` describe the
+    processing.
     """
 
     time: np.ndarray
@@ -35,9 +35,9 @@ class Track:
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     """Clean a channel, and put it on even instants.
 
-    What is no number and repeated stamps [s] are left out, a few lost samples bridged, longer gaps split it. Raises
-    LogError for too little, for time that decreases, for stamps that are repeated with other values, and for sampling
-    that is not even.
+    Values that are no numbers and repeated stamps [s] are left out, a few lost samples interpolated, and longer gaps
+    split it. Raises LogError for too few samples, decreasing time, stamps repeated with other values, and uneven
+    sampling.
     """
     settings = LogSettings.current()
     read: list[str] = []
@@ -70,14 +70,14 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 
 def usual_step(steps: np.ndarray) -> float:
-    """Return the mean [s] of the steps of time, shape (n,), that are no gaps."""
+    """Return the mean [s] of the time steps, shape (n,), that are no gaps."""
     return float(steps[~gaps(steps)].mean())
 
 
 def gaps(steps: np.ndarray) -> np.ndarray:
-    """Tell which steps of time, shape (n,), are gaps.
+    """Tell which time steps, shape (n,), are gaps.
 
-    The samples behind a gap stay late, while a step that only scatter made long has short ones beside it.
+    Samples after a gap stay late, while a step that only scatter made long has short neighbours.
     """
     settings = LogSettings.current()
     usual = float(np.median(steps))
@@ -92,9 +92,9 @@ def gaps(steps: np.ndarray) -> np.ndarray:
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fill in lost samples evenly, on a cubic spline through the others.
+    """Interpolate lost samples by a cubic spline through the others.
 
-    So many are `lost` behind each sample but the last, shape (n - 1,). Returns instants and values, and which of them
+    `lost` counts them after each sample but the last, shape (n - 1,). Returns instants and values, and which samples
     were lost.
     """
     if not lost.any():
@@ -108,7 +108,7 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return the samples that are numbers, and how many are not between the first and the last.
+    """Return the samples that are numbers, and how many inside are not.
 
     Raises LogError.
     """
@@ -125,8 +125,8 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 def _evened(name: str, raw: Track) -> Track:
     """Put a track on even instants.
 
-    They are its own where the stamps scatter little, or no more than their digits make them; else it is interpolated,
-    which the notes say.
+    Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the track is
+    interpolated, with a note.
     """
     settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)
@@ -191,7 +191,7 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
     """Bring all tracks to the instants of the coarsest one that all of them cover.
 
     Returns these instants as a track, and the values by name. Others are interpolated linearly within their own
-    segments only. Raises LogError where nothing is covered by all.
+    segments. Raises LogError if the tracks have no time in common.
     """
     settings = LogSettings.current()
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
@@ -265,6 +265,6 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """Return the stretches of a segment without any sample that is not covered."""
+    """Return the stretches of a segment in which all samples are covered."""
     edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
     return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

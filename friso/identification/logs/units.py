@@ -1,4 +1,4 @@
-"""Unit texts of files and options, turned into SI where they can be."""
+"""Convert unit texts of files and options to SI where possible."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.quantities import Quantity, any_sign, quoted
 
 _WORDS = read_lists("units")
 RMS, COUNTS = (frozenset(_WORDS[name]) for name in ("rms", "counts"))
-"""How amperes of a drive are written that are root mean squares of its phases, and steps of a sensor."""
+"""Spellings of RMS amperes of a drive's phases, and of sensor counts."""
 
 OTHERS = {
     "m": ("rad",),
@@ -28,38 +28,37 @@ OTHERS = {
     "rad/s^2": ("m/s^2",),
     "N*m": ("A", "V", "N"),
 }
-"""What may stand in place of the SI unit of a role, on a linear or a rotary axis, where the caller allows it: turned
-into these units."""
+"""Units that may replace the SI unit of a role, on a linear or rotary axis, if the caller allows it."""
 FOREIGN = (*OTHERS["N"], "count")
-"""Units in which a force may stand where estimates per such a unit are an answer."""
+"""Units of a force for which estimates per unit are an answer."""
 RESPONSES = tuple(
     f"{place}{rate}/{force}"
     for place, torque in (("m", "N"), ("rad", "(N*m)"))
     for rate in ("", "/s", "/s^2")
     for force in (torque, "A", "V")
 )
-"""Units of frequency responses: positions and their rates over forces, or what stands for these."""
+"""Units of frequency responses: positions and their rates over forces, or over substitutes of forces."""
 _SPELLINGS = {text: unit for unit, texts in _WORDS["spellings"].items() for text in texts} | dict.fromkeys(RMS, "A")
-"""Units as friso takes them, by how people write them."""
+"""The units that friso knows, by their usual spellings."""
 _MEGA = 1e5
-"""No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
+"""Factor above which a unit is a misspelling: no log is in megametres, megaseconds or gigaradians."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"secs?|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
 )
 _OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\([^()]+\)|[^\s()\[\]]+)")
-"""Headings of ISO 80000, a quantity over its unit, and their like in words."""
+"""Headings in the style of ISO 80000, a quantity over its unit, also in words."""
 _QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\s*/\s*(?P<under>[^\s_/\[(\])]+)")
-"""Headings whose last part is, or may be, a unit over a unit: "Speed m/s"."""
+"""Headings that end, or may end, with a quotient of units: "Speed m/s"."""
 _DECIBELS = re.compile(r"dB(?![A-Za-z])(?:\s*(?:rel?\b\.?|ref\b\.?))?\s*[(\[]?([^()\[\]]*)[)\]]?", re.IGNORECASE)
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
-"""Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
+"""Names that end with an unambiguous unit; pos_in and pos_min have no unit."""
 _MEASURED_IN = channel_words()["measured_in"]
-"""Words in a name that tell what is measured in these letters."""
+"""Words in a name that imply the unit."""
 
 
 def likely_unit(words: Iterable[str]) -> str:
-    """Return the unit in which what the words of a name tell is measured; "" for none.
+    """Return the unit that the words of a name imply; "" for none.
 
     A single letter is no word.
     """
@@ -88,7 +87,7 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """Return the text of a unit that follows a division sign, in brackets if it is a product.
+    """Return the unit text after a division sign, in brackets if it is a product.
 
     Otherwise "rad/N*m" would read as rad/N times m.
     """
@@ -97,7 +96,7 @@ def _below(part: str, before: str) -> str:
 
 @lru_cache(maxsize=1024)
 def unit_factor(unit: str, si_unit: str) -> float | None:
-    """Return the SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
+    """Return the SI value of 1 `unit`, or None if it is not of the kind of `si_unit`."""
     try:
         factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
@@ -113,7 +112,7 @@ def is_unit(text: str) -> bool:
 
 
 def of_decibels(text: str) -> str | None:
-    """Return what decibels are of, "" for nothing told; None for no decibels.
+    """Return the reference of decibels, "" if not stated; None if the unit is not decibels.
 
     Of "dB re 1 m/N" it is "1 m/N".
     """
@@ -142,9 +141,9 @@ _KINDS = (
 def split_heading(heading: str) -> tuple[str, str]:
     """Split a heading into name and unit: "Position (mm)" is ("Position", "mm").
 
-    A text in square brackets is always a unit unless it is an index; one in parentheses only where it is a known unit
-    ("current (filtered)" has none), as one behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is
-    in the unit, and "Gain A/V" has none. Else a name may end with its unit, and keeps it: "angle_deg".
+    Text in square brackets is a unit unless it is an index; text in parentheses, after a stroke or after "in" only if
+    it is a known unit ("current (filtered)" has none): "x/mm", "Kraft in N". In "Speed m/s" the stroke belongs to the
+    unit, and "Gain A/V" has none. Otherwise a name may end with its unit, and keeps it: "angle_deg".
     """
     heading = heading.strip()
     quotient = _QUOTIENT.fullmatch(heading)
@@ -178,10 +177,10 @@ def _last_part(name: str) -> str:
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:
-    """Return a factor, and the unit that values have with it.
+    """Return a factor, and the unit of the values multiplied by it.
 
-    It is that of the role where possible, else one that may stand in its place, else the unit as it stands with factor
-    1 ("1" for no unit).
+    It is the unit of the role if possible, else one that may replace it, else the given unit with factor 1 ("1" for no
+    unit).
     """
     for target in (role_unit, *OTHERS.get(role_unit, ())):
         value = unit_factor(unit, target) if unit else None

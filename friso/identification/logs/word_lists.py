@@ -1,4 +1,4 @@
-"""Lists of words by which channels and units are recognised, from the TOML files beside this module."""
+"""Load the word lists by which channels and units are recognised, from the TOML files beside this module."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def channel_words() -> dict[str, Any]:
 
 
 def _joined(table: dict[str, Any]) -> dict[str, Any]:
-    """Join lists of words, one for each language, into one set; nested tables likewise."""
+    """Join word lists, one for each language, into one set; nested tables likewise."""
     return {
         key: frozenset(word for words in value.values() for word in words)
         if all(isinstance(words, list) for words in value.values())

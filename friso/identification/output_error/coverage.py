@@ -1,4 +1,4 @@
-"""What a record's motion can show at all: slow steady speeds for the Stribeck effect, stuck phases for the bristles."""
+"""Determine what the motion of a record can show: steady speeds for the Stribeck effect, sticking for the bristles."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from friso.identification.readings.common import turns_of
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the motion of a record covers: steady speeds, and starts of motions.
+    """Coverage of a record's motion: steady speeds, and starts of motions.
 
-    `steady` holds speeds of steady motion [m/s], ascending, one per stretch. `starts` holds, for each stretch between
-    turning points, the ways [m] gone at its samples, NaN where inertia outweighed friction. Below `resolution` [m] of
-    position nothing is seen, below `slowest` [m/s] no speed.
+    `steady` has speeds of steady motion [m/s], ascending, one per stretch. `starts` has, for each stretch between
+    turning points, the distances [m] covered at its samples, NaN where inertia outweighed friction. `resolution` [m] is
+    the smallest visible displacement, `slowest` [m/s] the lowest visible speed.
     """
 
     steady: np.ndarray
@@ -26,9 +26,9 @@ class Coverage:
     slowest: float
 
     def shows_speed(self, speed: float) -> bool:
-        """Tell whether there is steady motion both below and above a speed [m/s], near it.
+        """Tell whether there is steady motion near a speed [m/s], both below and above it.
 
-        A Stribeck velocity shows in how friction falls about it, and steady motion on one side of it shows no fall.
+        The Stribeck velocity shows in the fall of friction about it, which steady motion on one side does not show.
         """
         settings = OutputErrorSettings.current()
         below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
@@ -37,16 +37,16 @@ class Coverage:
 
     @property
     def gap(self) -> tuple[float, float]:
-        """The widest range of speeds [m/s] without steady motion."""
+        """Return the widest range of speeds [m/s] without steady motion."""
         speeds = np.concatenate([[self.slowest], self.steady]) if self.steady.size else np.array([self.slowest, np.inf])
         widest = int(np.argmax(speeds[1:] / speeds[:-1]))
         return float(speeds[widest]), float(speeds[widest + 1])
 
     def shows_length(self, length: float) -> bool:
-        """Tell whether bristles are seen bending by a length [m], again and again.
+        """Tell whether bristles are repeatedly seen bending by a length [m].
 
-        The bend has to stand out of the noise of the position over several samples of several starts: one start may be
-        chance.
+        The bend must stand out of the noise of the position over several samples of several starts, because one start
+        may be chance.
         """
         settings = OutputErrorSettings.current()
         passes = [
@@ -57,10 +57,10 @@ class Coverage:
 
 
 def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
-    """Find what a motion covers: at which speeds it is steady, and how its starts go.
+    """Determine the coverage of a motion: steady speeds, and starts.
 
     The motion, of shape (n,), is that of a mass [kg] with a Coulomb friction [N], sampled every `sample_time` [s]. It
-    is steady where inertia stays below a share of that friction for long enough.
+    is steady where inertia stays below a fraction of that friction for long enough.
     """
     settings = OutputErrorSettings.current()
     rough = position - moved.position
@@ -85,10 +85,10 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
 
 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
-    """Return the ways [m] gone from each turning point to the next, where inertia was small.
+    """Return the distances [m] covered from each turning point to the next, where inertia was small.
 
-    A swing that is less than `swing` [m] turns nothing. Samples at which inertia outweighs friction are NaN: the force
-    does not show the bristles there.
+    A swing below `swing` [m] is no turn. Samples at which inertia outweighs friction are NaN, because the force does
+    not show the bristles there.
     """
     ends = np.unique([0, *turns_of(position, swing)])
     calm = mass_per_force * np.abs(moved.acceleration) < OutputErrorSettings.current().friction_share_of_inertia

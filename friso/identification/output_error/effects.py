@@ -1,4 +1,4 @@
-"""How far a force that the model leaves out would move a fit: one linear step about the fitted numbers."""
+"""Estimate how far a force that the model leaves out would move a fit, by one linear step."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from friso.intervals import COVERAGE
 
 @dataclass(frozen=True)
 class ExplainedResidual:
-    """What effects that the model leaves out explain of the residual of a fit.
+    """Effect of forces that the model leaves out on the residual of a fit.
 
-    `moved` is how far they move the fitted numbers, shape (free,), `sizes` are theirs, and `left` is the share of the
-    residual's power that is left with them.
+    `moved` is the shift of the fitted numbers, shape (free,), `sizes` are the sizes of the effects, and `left` is the
+    remaining fraction of the residual's power.
     """
 
     moved: np.ndarray
@@ -30,10 +30,10 @@ class ExplainedResidual:
 def explained_by_forces(
     fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit further forces to what a fit leaves, with its own numbers free to follow.
+    """Fit further forces to the residual of a fit, with its own numbers free to follow.
 
-    Each force [N], shape (n,), is one of size 1; it is tried at the size `unit`, small enough for its effect to be in
-    proportion. Returns None where the forces explain no more than chance, the best of so many `searched` ones.
+    Each force [N], shape (n,), has size 1; it is tried at the size `unit`, small enough to be linear. Returns None if
+    the forces explain no more than the best of `searched` random ones.
     """
     rest, slopes = fit.linearised
     return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
@@ -44,8 +44,8 @@ def explained_by(
 ) -> ExplainedResidual | None:
     """Fit a residual, shape (n,), by fitted numbers and further effects.
 
-    Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number that changes
-    nothing, or of which nothing finite is known, does not move. Returns None where the effects clearly explain nothing.
+    Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number without effect, or
+    with infinite derivatives, does not move. Returns None if the effects clearly explain nothing.
     """
     settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])
@@ -66,14 +66,14 @@ def explained_by(
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
-    """Return the fit with deviations whose intervals reach `further`, shape (free,), each way."""
+    """Return the fit with intervals that reach `further`, shape (free,), each way."""
     return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 
 def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
-    """Return what further forces on the stage change of the residual of a fit, per size, each of shape (n,).
+    """Return the change of a fit's residual by further forces, per size, each of shape (n,).
 
-    Each force [N], shape (n,), is one of size 1, and is tried at the size `unit`. All are simulated side by side.
+    Each force [N], shape (n,), has size 1, and is tried at the size `unit`. All are simulated side by side.
     """
     inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
     pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))

@@ -1,4 +1,4 @@
-"""The fit: a thousand starts, the best of them refined side by side, and the best of those to the end."""
+"""Fit the whole model: simulate a thousand starts, refine the best side by side, and finish the best of those."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from friso.progress import Progress, Tally, share_of, silent
 
 @dataclass(frozen=True)
 class OutputErrorFit:
-    """A fit of the whole model to a log, with how well its numbers are known.
+    """A fit of the whole model to a log, with the uncertainty of its numbers.
 
-    `inner` holds the fitted numbers, shape (parameters,), of which those numbered in `free` were fitted. Their
+    `inner` has the fitted numbers, shape (parameters,), of which those numbered in `free` were fitted. Their
     `covariance` has the shape (free, free), and the `residual` [N] the shape (n,).
     """
 
@@ -36,19 +36,18 @@ class OutputErrorFit:
 
     @property
     def cost(self) -> float:
-        """The mean square of the residual [N^2]."""
+        """Return the mean square of the residual [N^2]."""
         return float(np.mean(self.residual**2))
 
     @property
     def left(self) -> float:
-        """What the fit leaves of the force [N], RMS over the samples that count."""
+        """Return the RMS residual force [N] over the samples that count."""
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Tell whether the fit explains the log up to about its `noise` [N].
+        """Tell whether the residual is about the `noise` [N] of the log; the limit is tighter if `closely`.
 
-        With `closely`, the limit is tighter. If the stage is held to the log, only a part of the noise passes into the
-        residual.
+        For a stage that follows the log, only a part of the noise passes into the residual.
         """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
@@ -56,12 +55,12 @@ class OutputErrorFit:
 
     @property
     def independent(self) -> float:
-        """How many independent samples the residual is worth: neighbouring ones are alike."""
+        """Return the number of independent samples of the residual, whose neighbours are correlated."""
         return max(float(self.problem.counted.sum()), 1.0) / correlation_length(self.residual)
 
     @property
     def stage(self) -> dict[str, Any]:
-        """The stage of the fit as flat keys."""
+        """Return the stage of the fit as flat keys."""
         parameters = zip(self.problem.parameters, self.inner, strict=True)
         values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
@@ -72,9 +71,9 @@ class OutputErrorFit:
         return np.sqrt(np.diag(self.covariance))
 
     def with_deviations(self, wanted: np.ndarray) -> OutputErrorFit:
-        """Return the fit with these deviations, shape (free,), of its numbers, correlated as before.
+        """Return the fit with given deviations, shape (free,), and unchanged correlations.
 
-        A deviation that is 0 or not finite stays: nothing is known of what it would be with another size.
+        A deviation that is 0 or not finite stays, because its scale is unknown.
         """
         usable = np.isfinite(self.deviation) & (self.deviation > 0)
         wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
@@ -128,10 +127,10 @@ def fits(
 def _fit(
     problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
 ) -> OutputErrorFit:
-    """Refine the best starts in rounds, of which each keeps fewer, and the last one to the end.
+    """Refine the best starts in rounds that keep fewer and fewer, and finish the last one.
 
-    What a start is worth shows after a few iterations, on pieces of a long record: of a stage that sticks and slips the
-    starts that are best as they are lead to other optima.
+    The quality of a start shows after a few iterations, on pieces of a long record: for a stage that sticks and slips
+    the best starts often lead to worse optima.
     """
     settings = OutputErrorSettings.current()
     mask = np.zeros(tried.shape[1], bool)
@@ -150,10 +149,10 @@ def _fit(
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Spread many starts over the ranges of the free parameters, (starts, parameters).
+    """Spread many starts over the ranges of the free parameters, (starts, parameters), beginning with `first`.
 
-    The start `first` comes first. They find parameters that not every motion shows. Core parameters start near the
-    inverse model's values, since a first fit of them alone to motion that sticks and slips can end anywhere.
+    They find parameters that not every motion shows. Core parameters start near the inverse model's values, because a
+    first fit of them alone to stick-slip motion can end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
@@ -173,9 +172,9 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts that another problem's fit allows, (starts, parameters); the fit is first.
+    """Draw starts from another problem's fit, (starts, parameters), beginning with that fit.
 
-    They are drawn from its covariance, several times as wide: the loop of a stage that hunts has optima of its own.
+    They are drawn from its covariance, several times as wide, because the loop of a stage that hunts has other optima.
     """
     settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
@@ -215,8 +214,8 @@ def _ranked(
 def _parts(problem: Problem, starts: int) -> list[slice]:
     """Choose the stretches of a record over which starts are simulated.
 
-    All of a short record is. Of a long one in closed loop it is the beginning, for its state later on is unknown; else
-    stretches from all over it, since slow motion may come last.
+    A short record is used whole. Of a long one in closed loop the beginning is used, because its later state is
+    unknown; otherwise stretches from all over it, because slow motion may come last.
     """
     settings = OutputErrorSettings.current()
     count, most = len(problem.target), int(settings.samples_of_all_starts / starts)
@@ -229,10 +228,9 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
 
 
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """Refine a fit to the end, and find how well its numbers are known.
+    """Finish a fit, and determine the uncertainty of its numbers.
 
-    Deviations allow for neighbouring errors that are alike, and for inputs that the log allows just as well
-    (`unsettled`).
+    Deviations allow for correlated errors, and for other inputs that the log allows (`unsettled`).
     """
     settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
@@ -249,10 +247,10 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """Widen a covariance, (free, free), so that intervals hold the results of other inputs.
+    """Widen a covariance, (free, free), so that intervals contain the results of other inputs.
 
-    Each of `moved`, shape (free,), says how far one of these inputs moves the fitted numbers. One input is true, not a
-    mean of them: an interval over half of the distance would never hold the truth.
+    Each of `moved`, shape (free,), is the shift of the fitted numbers by one input. One of the inputs is true, not
+    their mean, so half of the distance would not do.
     """
     if not moved:
         return covariance
@@ -265,7 +263,7 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return how far other inputs that the log allows move the fitted numbers, shape (free,)."""
+    """Return the shift of the fitted numbers by other inputs that the log allows, shape (free,)."""
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():

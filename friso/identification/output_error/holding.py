@@ -1,5 +1,4 @@
-"""What a log does not say of the motion between its samples, as far as a fit tells: how smooth it was, and whether the
-force was held or followed straight lines."""
+"""Decide how smooth the motion of a log was, and whether its force was held or interpolated between samples."""
 
 from __future__ import annotations
 
@@ -12,11 +11,11 @@ from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
-    """Smooth the position of a log less and less, as long as the fit gets better.
+    """Smooth the position of a log less and less, as long as the fit improves.
 
-    Smoothing blurs where a stage breaks away: of one that stuck and slipped, the exponent of the Stribeck curve came
-    out at 1.47 for 2 and the bristles a fifth too soft, without any noise as well. Too little smoothing leaves the
-    noise of the position to the force.
+    Smoothing blurs the instants of break-away: for stick-slip motion, the exponent of the Stribeck curve came out at
+    1.47 for 2 and the bristles a fifth too soft, even without noise. Too little smoothing passes the noise of the
+    position on to the force.
     """
     while fit.problem.sharper:
         sharper = polished(fit.problem.held_to(0), fit.free, fit.inner)
@@ -27,10 +26,10 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 
 
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
-    """Choose whether the force of a log is held between its samples or follows straight lines.
+    """Choose whether the force of a log is held between its samples or interpolated linearly.
 
-    Half a sample apart, the two move the damping of the bristles by half a sample times their stiffness. The worse one
-    no longer counts where the better explains the record, to the `noise` [N] of its force, and the worse clearly less.
+    They differ by half a sample, which shifts the damping of the bristles by half a sample times their stiffness. The
+    worse one is dropped if the better explains the record to the `noise` [N] of its force, and the worse clearly less.
     """
     settings = OutputErrorSettings.current()
     problem = fit.problem

@@ -1,4 +1,4 @@
-"""Which parameters a log shows: the fit with those that any motion shows, with all, and what of the rest to believe."""
+"""Decide which parameters a log determines: fit those that any motion shows, then all, and profile the others."""
 
 from __future__ import annotations
 
@@ -19,21 +19,20 @@ from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
 
 PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
-"""Shares of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all along
-the log, and the closed loop from there; the last is how well they are known then."""
+"""Fractions of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all
+along the log, and the closed loop from there; the last part is the uncertainty."""
 
 FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
-"""Shares of the work of the fit along the log up to the ends of its parts: the fit of all parameters, what the log does
-not say between its samples, and how well each is known; the last part fits those that are shown."""
+"""Fractions of the work of the fit along the log up to the ends of its parts: the fit of all parameters, the motion
+between samples, and profiles; the last part fits the determined ones."""
 
 
 @dataclass(frozen=True)
 class IdentifiableFit:
-    """A fit, with the parameters of it that the record shows.
+    """A fit, with the parameters that the record determines.
 
-    `profiles` holds, by name, those of the parameters that not every motion shows, as far as they were asked about, and
-    `shown` the names that the record does show. `refuted` are parameters that something else in the record contradicts,
-    with the reason.
+    `profiles` has, by name, the profiles of parameters that not every motion shows, and `shown` the names of the
+    determined ones. `refuted` are parameters that something else in the record contradicts, with the reason.
     """
 
     fit: OutputErrorFit
@@ -50,15 +49,14 @@ def fit_identifiable(
     noise: float,
     progress: Progress = silent,
 ) -> IdentifiableFit:
-    """Fit the whole model to a log, and decide what of the fit to believe.
+    """Fit the whole model to a log, and decide which parameters to report.
 
     `bandwidth` [Hz] is that of the motion, and `noise` [N] that of the force.
 
-    A closed loop that explains the record to its noise has the first and last word, if need be from where the stage
-    that follows the log leads. Where none does, that stage decides which parameters are shown, since a loop that hunts
-    soon gets out of step, and the loop has no more to say than their values, unless it cannot follow. Where the fit is
-    clearly better with parameters that are not shown it keeps them: their effect is there, and without it friction and
-    mass would have to explain it.
+    A closed loop that explains the record to its noise decides, started if necessary from the fit of the stage that
+    follows the log. Without one, the stage that follows the log decides which parameters are determined, because a loop
+    that hunts soon gets out of step; the loop then only improves values, unless it cannot follow. If the fit is clearly
+    better with undetermined parameters it keeps them, because friction and mass would otherwise absorb their effect.
     """
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
@@ -91,7 +89,7 @@ def fit_identifiable(
 def _identifiable_on_log(
     follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, noise: float, progress: Progress
 ) -> IdentifiableFit:
-    """Fit the stage that follows the log, and find which parameters it shows.
+    """Fit the stage that follows the log, and find which parameters it determines.
 
     `plain` is the fit of the `core` parameters alone. Parameters that the motion cannot show are not tried.
     """
@@ -120,10 +118,10 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """Profile all parameters that not every motion shows, and decide which of them to believe.
+    """Profile all parameters that not every motion shows, and decide which of them to report.
 
-    A fit that has `explained` the record is believed wherever its profiles are sharp; another one only where the motion
-    also covers what the parameter does. Where a profile finds a fit that is clearly better, that one takes its place.
+    If the fit has `explained` the record, a sharp profile suffices; otherwise the motion must also cover the effect of
+    the parameter. If a profile finds a clearly better fit, that one replaces it.
     """
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
@@ -153,10 +151,10 @@ def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
-    """Tell whether a closed loop follows the log about as well as the stage held to the log.
+    """Tell whether a closed loop follows the log about as well as the stage driven along the log.
 
-    Their residuals are compared within the motion's bandwidth [Hz], and only where the latter counts, since it holds
-    no noise above that.
+    Their residuals are compared within the motion's bandwidth [Hz], and only where the latter counts, because it
+    contains no noise above that.
     """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
@@ -164,10 +162,9 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
 
 
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
-    """Tell whether a closed loop bounds all numbers that the stage which follows the log does.
+    """Tell whether a closed loop bounds all numbers that the stage following the log bounds.
 
-    Of a stage that sticks and slips, a loop may end where a few break-aways, a little late or early, are all that its
-    derivatives know.
+    For stick-slip motion, the derivatives of a loop may contain nothing but slightly shifted break-aways.
     """
     bounded = [
         {i for i, variance in zip(fit.free, np.diag(fit.covariance), strict=True) if np.isfinite(variance)}
@@ -182,7 +179,7 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve if only one of its parameters is shown: alone it means nothing."""
+    """Drop the Stribeck curve if only one of its parameters is determined, which alone means nothing."""
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 
@@ -198,7 +195,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
-    """Tell whether a profile closes on both sides, and near the fit."""
+    """Tell whether a profile closes on both sides, near the fit."""
     settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
@@ -206,7 +203,7 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
-    """Tell whether the motion covers the speeds, or the ways, at which a fitted parameter acts."""
+    """Tell whether the motion covers the speeds, or the displacements, at which a fitted parameter acts."""
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:
@@ -218,7 +215,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
 
 
 def why_not_shown(name: str, covered: Coverage) -> str:
-    """Say in a sentence why a parameter is not shown."""
+    """Return in a sentence why a parameter is not determined."""
     if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):

@@ -1,4 +1,4 @@
-"""What is fitted: parameters, their ranges, and the stages that their values make."""
+"""Define the fitted parameters, their ranges, and the stages that follow from their values."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
-"""The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
+"""Names of parameters: the moving mass; the cart's fraction of it, which a rigid stage keeps as given; static over
+Coulomb friction."""
 
 EXPONENT = "friction.stribeck_exponent"
 STRIBECK = (RATIO, "friction.stribeck_velocity")
@@ -27,8 +28,8 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 class FitParameter:
     """A parameter of the fit with its SI unit, start value and range.
 
-    Of a `logarithmic` one the logarithm is fitted. `core` parameters are shown by any motion; the others are asked
-    about one by one.
+    Of a `logarithmic` one the logarithm is fitted. `core` parameters are shown by any motion; others are examined one
+    by one.
     """
 
     name: str
@@ -40,7 +41,7 @@ class FitParameter:
     core: bool = True
 
     def inner(self, value: Any) -> Any:
-        """Return the number that is fitted for an SI value: its logarithm, or the value itself."""
+        """Return the fitted number for an SI value: its logarithm, or the value itself."""
         return np.log(value) if self.logarithmic else value
 
     def outer(self, inner: Any) -> Any:
@@ -61,9 +62,9 @@ def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def stribeck_up_to(flat: Mapping[str, Any]) -> float:
-    """Return the highest Stribeck velocity [m/s] that is believed of a bearing.
+    """Return the highest plausible Stribeck velocity [m/s] of a bearing.
 
-    On a rotary axis it is in rad/s, at the radius in the middle of those that bearings have.
+    On a rotary axis it is in rad/s, at a medium radius of bearings.
     """
     settings = OutputErrorSettings.current()
     return (
@@ -81,10 +82,10 @@ def is_free(flat: Mapping[str, Any]) -> bool:
 def fit_parameters(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """List the parameters that a log may show of a stage, with their starts and ranges.
+    """List the parameters of a stage that a log may determine, with their starts and ranges.
 
-    `levels` holds first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s]
-    is the highest in the log, and `travel` [m] its range: no bristle bends further, and no Stribeck velocity is higher
+    `levels` has first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s] is
+    the highest in the log, and `travel` [m] its range: no bristle bends further, and no Stribeck velocity is higher
     unless bearings have such. If the log does not go `both_ways`, a constant force and an asymmetry cannot be
     distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
     """
@@ -142,7 +143,7 @@ def _friction(
 def _exponent(stated: float) -> FitParameter:
     """Return the exponent of the Stribeck curve as a parameter.
 
-    It starts a little below what the stage has: 1 and 2 have equations of their own, in which no exponent occurs.
+    It starts slightly below the stage's value, because 1 and 2 have equations without an exponent.
     """
     settings = OutputErrorSettings.current()
     start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents

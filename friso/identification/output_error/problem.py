@@ -1,4 +1,4 @@
-"""The fit as a problem: what is simulated for given parameters, and how far it is from the log."""
+"""Define the fit as a problem: the simulation for given parameters, and its distance from the log."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ class Problem:
     """A stage that follows a log, with the parameters to fit and the force [N] to reproduce.
 
     In a `closed` loop the stage has its machine's controller and follows the logged reference; `target` is the logged
-    force. Otherwise the logged force acts on the stage, and a controller of friso's own holds it to the logged
-    position; `target` is zero, because whatever that controller has to add is what the model does not explain.
+    force. Otherwise the logged force acts on the stage, and a controller of friso's own drives it along the logged
+    position; `target` is zero, because the force of that controller is what the model does not explain.
 
-    `start` holds position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
-    leaves out. `unsettled` are inputs that the log allows as well as those taken, and `sharper` are positions [m],
-    smoothed less and less, to which the stage may be held instead.
+    `start` has position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
+    leaves out. `unsettled` are other inputs that the log allows, and `sharper` are positions [m], smoothed less and
+    less, that the stage may follow instead.
     """
 
     flat: Mapping[str, Any]
@@ -74,10 +74,10 @@ class Problem:
 
     @property
     def passes(self) -> float:
-        """The share of the noise of the log's force, RMS, that the residual holds.
+        """Return the fraction of the noise of the log's force, RMS, in the residual.
 
-        In closed loop that is all of it; of a stage that is held to the log it is what the controller that holds it
-        lets through, (2 w s + w^2) / (s + w)^2.
+        In closed loop it is 1; for a stage that follows the log it is the part that the guiding controller passes, (2 w
+        s + w^2) / (s + w)^2.
         """
         if self.closed:
             return 1.0
@@ -85,9 +85,9 @@ class Problem:
         return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
 
     def held_to(self, level: int) -> Problem:
-        """Return the problem with the stage held to one of the `sharper` positions, by number.
+        """Return the problem with the stage driven along one of the `sharper` positions, by number.
 
-        The next sharper one is then among the inputs that are not settled.
+        The next sharper one then counts among the unsettled inputs.
         """
         inputs = replace(self.inputs, reference=self.sharper[level])
         held = tuple(replace(inputs, held=one.held) for one in self.unsettled if one.held != self.inputs.held)
@@ -98,7 +98,7 @@ class Problem:
     def part(self, samples: slice) -> Problem:
         """Return the problem on a stretch of the samples.
 
-        A stretch that does not begin with the first sample begins on the reference, as a stage does that follows a log.
+        A stretch that does not begin with the first sample begins on the reference, as a stage that follows a log does.
         """
         reference = self.inputs.reference[samples]
         inputs = replace(self.inputs, reference=reference, force=self.inputs.force[samples])
@@ -122,7 +122,7 @@ class Problem:
         return Simulated(record.position[0], record.velocity[0], record.force[0])
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
-        """Return wanted minus simulated force [N], shape (runs, n).
+        """Return target minus simulated force [N], shape (runs, n).
 
         It is 0 at samples that do not count, and infinite for runs that failed.
         """
@@ -149,9 +149,9 @@ class Problem:
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residual of fitted numbers, (parameters,), and its derivatives.
 
-        The derivatives, to the `free` numbers, have the shape (n, free). At each sample the smaller one of the
-        differences to both sides counts: a break-away that a step just causes, or prevents, appears on one side only
-        and is no derivative.
+        The derivatives by the `free` numbers have the shape (n, free). At each sample the smaller of the differences to
+        both sides counts: a break-away that a step just causes, or prevents, appears on one side only and is no
+        derivative.
         """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])
@@ -220,9 +220,9 @@ class Problem:
         return force
 
     def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
-        """Return the force [N] of the controller that holds a stage to a log, shape (runs, n).
+        """Return the force [N] of the controller that drives a stage along a log, shape (runs, n).
 
-        It is computed here instead of by the model's outputs, which takes longer.
+        It is computed here because the model's outputs take longer.
         """
         count = runs.states.shape[1]
         off, slip = (
@@ -258,9 +258,9 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
 
 
 def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
-    """Say why a sampling drive's controller is simulated in continuous time nevertheless.
+    """Return why a sampling drive's controller is simulated in continuous time, "" if it is not.
 
-    The sentence is empty if it is not, or if the drive's sample time is not known. `sample_time` [s] is the log's.
+    `sample_time` [s] is the log's. The text is also "" if the drive's sample time is not known.
     """
     if "drive.sample_time" not in flat:
         return ""
@@ -273,11 +273,11 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
-    """Set up the stage under the logged force, held to the smoothed logged position.
+    """Set up the stage under the logged force, driven along the smoothed logged position by a slow controller.
 
-    A slow controller holds it; `bandwidth` [Hz] is that of the motion. A faster controller, or noise, would shake the
-    bristles of a stage at rest. A log tells neither whether its force is held between samples or interpolated, nor how
-    smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for long enough.
+    `bandwidth` [Hz] is that of the motion. A faster controller, or noise, would shake the bristles of a stage at rest.
+    A log determines neither whether its force is held between samples or interpolated, nor how smooth its motion was:
+    these stay unsettled. Raises InputError for a log that never moves for long enough.
     """
     identification_settings = IdentificationSettings.current()
     settings = OutputErrorSettings.current()
@@ -317,9 +317,8 @@ def tracking(
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
     """Return 1 where a motion, shape (n,) [m], moves, and 0 where it rests.
 
-    A stage that sticks does so within micrometres of the log, and the controller that holds it to the log then shows
-    that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
-    the beginning.
+    A sticking stage is within micrometres of the log, and the guiding controller then shows that distance instead of a
+    force. So rests do not count, nor does the time `settling` [s] after each rest and after the beginning.
     """
     settings = OutputErrorSettings.current()
     window = max(3, round(settings.time_of_a_rest / sample_time))
@@ -334,7 +333,8 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
 def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
     """Return the standard deviation [m] of the noise of a position, shape (n,).
 
-    It is what a `smooth` position leaves of it, or what neighbouring samples do not share, where little is smoothed.
+    It is the difference to a `smooth` position, or, with little smoothing, the part that neighbouring samples do not
+    share.
     """
     return max(robust(position - smooth), noise_of(position))
 
@@ -342,7 +342,7 @@ def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
 def _after_start(count: int, sample_time: float) -> np.ndarray:
     """Return 0 for the first samples of a closed loop and 1 for all others, shape (count,).
 
-    The first samples show how the loop was started, which a log tells only roughly.
+    The first samples depend on the initial state of the loop, which a log shows only roughly.
     """
     settings = OutputErrorSettings.current()
     first = round(min(settings.time_of_a_start / sample_time, settings.record_share_of_a_start * count))

@@ -1,4 +1,4 @@
-"""Profile intervals: how far a parameter can be moved, all others following, before the fit gets clearly worse."""
+"""Compute profile intervals, by moving one parameter and refitting all others."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from friso.identification.output_error.refine import Refined, bounds_of, costs, 
 from friso.identification.output_error.settings import OutputErrorSettings
 
 WORSE = float(chi2.ppf(0.95, 1))
-"""By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
+"""Increase of -2 ln(likelihood) at the ends of a 95 % interval."""
 
 
 @dataclass(frozen=True)
 class Profile:
-    """How much worse a fit gets as one parameter is moved away, all others following.
+    """Cost of a fit as one parameter is moved away, with all others refitted.
 
-    `values` of the parameter, ascending [SI], have `cost`, the mean squares of the residual [N^2]; inside the 95 %
-    interval that is at most `limit`. `low` and `high` are the interval's ends, or those of the range where it ends
-    nowhere before (`open_low`, `open_high`).
+    `values` of the parameter, ascending [SI], have `cost`, the mean squares of the residual [N^2], which is at most
+    `limit` inside the 95 % interval. `low` and `high` are the interval's ends, or those of the range if it does not end
+    before (`open_low`, `open_high`).
     """
 
     name: str
@@ -61,7 +61,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
-    """Fit the other parameters at each of some values of one, shape (values,), as far as that leads to the `limit`."""
+    """Fit the other parameters at each value of one, shape (values,), as far as the `limit` can be reached."""
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
@@ -88,9 +88,9 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
 
 def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.ndarray:
-    """Return how far the others follow a number by the derivatives of the fit, shape (others,).
+    """Return the shift of the others per shift of a number by the derivatives of the fit, shape (others,).
 
-    They stay where the number is not fitted.
+    It is 0 for a number that is not fitted.
     """
     if number not in fit.free:
         return np.zeros(len(others))
@@ -103,10 +103,7 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Find where a profile crosses the limit on both sides of its minimum.
-
-    Also returns on which sides it does not.
-    """
+    """Find where a profile crosses the limit on both sides of its minimum, and on which sides it does not."""
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]
     inside = cost <= max(limit, cost[lowest])
@@ -121,7 +118,7 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
     """Find where a profile crosses the limit between two values.
 
-    The square root of what it is worse grows in proportion to the distance.
+    The square root of the excess grows in proportion to the distance.
     """
     if not np.isfinite(cost[outside]):
         return values[inside]

@@ -1,4 +1,4 @@
-"""Least squares from many starts at once: Levenberg-Marquardt in lockstep, all sensitivities of all starts in lanes."""
+"""Refine many starts at once by Levenberg-Marquardt, with the sensitivities of all starts in lanes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.progress import Progress, silent
 
 LADDER = np.array([0.1, 1.0, 10.0, 100.0])
-"""Dampings that are tried at once, in units of the last one that was best."""
+"""Dampings that are tried at once, in units of the previous best one."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ def refine_fit(
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
 
-    The starts have the shape (starts, parameters); `free`, of the same shape, marks the numbers to fit. A fit is done
-    when its sum of squares falls by less than the share `enough`.
+    The starts have the shape (starts, parameters); `free`, of equal shape, marks the numbers to fit. A fit ends when
+    its sum of squares falls by less than the fraction `enough`.
 
-    For every start several dampings are tried side by side, which costs less than the derivatives do; these are
-    recomputed only if one damping was better. A number at an end of its range stays there while it is driven out. A fit
-    that would not fall to the mean square `aim` at the pace of its last iteration is left as it is.
+    For every start several dampings are tried side by side, which costs less than derivatives; these are recomputed
+    only if one damping was better. A number at an end of its range stays there while it is driven outwards. A fit that
+    would not fall to the mean square `aim` at the pace of its last iteration is abandoned.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])

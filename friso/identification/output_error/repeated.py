@@ -1,5 +1,4 @@
-"""How far off a fit that follows a log comes out: repeated on simulated logs of the machine it made, whose truth is
-known."""
+"""Estimate the error of a fit by repeating it on simulated logs of the fitted machine, whose true values are known."""
 
 from __future__ import annotations
 
@@ -22,15 +21,14 @@ from friso.progress import Progress
 def as_far_off_as_repeated(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> OutputErrorFit:
-    """Widen a fit to a log to what fits to simulated logs of the fitted machine are off by.
+    """Widen a fit to a log by the errors of fits to simulated logs of the fitted machine.
 
     The stage followed `part` of the log; `noise` [N] is that of its force, and `bandwidth` [Hz] that of its motion.
-    Noise of the position blurs where a stage breaks away, and noise of the force breaks it away early or late: what the
-    stage that follows makes of that is no error about the fitted values that a Jacobian could tell, but one to one side
-    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
+    Noise of position and force shifts break-aways, which biases the fit to one side in a way that a Jacobian does not
+    show (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
 
-    A fit that leaves more than those to the simulated logs do is off by as much more than they are: noise that has led
-    it away, as that of a force in coarse digits does, moves the machine it made less than it moved the true one.
+    If the fit leaves more than those to the simulated logs, errors are scaled up by that ratio: coarse resolution of
+    the force moves the fit of the true machine further.
     """
     settings = OutputErrorSettings.current()
     free = np.isin(np.arange(len(once.inner)), once.free)
@@ -52,10 +50,10 @@ def as_far_off_as_repeated(
 
 
 def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
-    """Widen the damping of the bristles by what one sample of delay does to it.
+    """Widen the damping of the bristles by the effect of one sample of delay.
 
-    That is for a stage that followed a log which it does not explain to its noise: what holds it to the log knows no
-    better when it breaks away, and a delay passes for damping, times the stiffness.
+    This is for a stage that followed a log which it does not explain to its noise: a delay passes for damping, times
+    the stiffness.
     """
     names = [parameter.name for parameter in fit.problem.parameters]
     places = {names[number]: place for place, number in enumerate(fit.free)}
@@ -71,10 +69,10 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
 def _simulated_logs(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> Iterator[Problem]:
-    """Yield problems like that of a fit, of simulated logs whose truth is the fitted machine.
+    """Yield problems with simulated logs of the fitted machine.
 
-    Their force is that of the log and of the controller that held the stage to it, their position is the stage's own,
-    and either has the log's noise.
+    Their force is that of the log and of the guiding controller, their position is the stage's own, and both have the
+    log's noise.
     """
     settings = OutputErrorSettings.current()
     problem = once.problem

@@ -1,4 +1,4 @@
-"""From fitted numbers to keys of the stage file, with their intervals or what is left possible."""
+"""Convert fitted numbers to keys of the stage file, with their intervals or remaining ranges."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ METHOD = "output error"
 
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Turn a fit into estimates of keys of the stage file, with the correlation of those shown.
+    """Turn a fit into estimates of keys of the stage file, with the correlation of the determined ones.
 
-    Intervals reach as far as profiles do, and allow for the linearity of sensors; what the record does not show is a
-    range with the reason.
+    Intervals reach as far as profiles do, and allow for the linearity of sensors. Quantities that the record does not
+    determine have a range with the reason.
     """
     reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
@@ -77,11 +77,11 @@ def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray
 
 
 _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
-"""The parameter behind a key that has another name."""
+"""Parameters behind keys with another name."""
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
-    """Say why parameters, or keys that hang on them, are not shown."""
+    """Return why parameters, or keys that follow from them, are not determined."""
     settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
@@ -124,7 +124,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
-    """Return the keys of the stage file that fitted numbers make."""
+    """Return the keys of the stage file for fitted numbers."""
     values = {
         parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
     }
@@ -140,9 +140,9 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """Return what is possible of a key that is not shown: all that is believed of any bearing.
+    """Return the plausible range of a key that is not determined, that of any bearing.
 
-    What a fit makes of such a parameter, it makes up for what the model lacks, and is no bound.
+    The fitted value compensates for what the model lacks, and is no bound.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]

@@ -1,1 +1,1 @@
-"""What several kinds of experiment read off a log: passes at constant velocity, slips, the force on the bearing."""
+"""Read passes at constant velocity, slips, and the force on the bearing from logs, for several kinds of experiment."""

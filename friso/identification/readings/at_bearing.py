@@ -1,7 +1,7 @@
-"""From what the drive commands and the sensor sees to the bearing: force and motion of the body that rides on it.
+"""Convert the drive's command and the sensor's signal to force and motion of the body on the bearing.
 
-What of a record is looked at is held at a low-pass; friction depends on the whole motion, though, and so the motion is
-seen up to a few times that frequency.
+Records are compared below a cut-off; friction depends on the whole motion, which is kept up to a few times that
+frequency.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ HELD = "The joint is assumed held, with the limiter's stiffness: no bending show
 
 @dataclass(frozen=True)
 class StructureMode:
-    """The first mode of a structure on the side of the force and the sensor.
+    """First mode of a structure, on the side of the force and the sensor.
 
-    A `share` of the moving mass stands on a spring of its own; `frequency` [Hz] and damping ratio are those that it has
-    there, the rest being held.
+    A fraction `share` of the moving mass stands on a spring; `frequency` [Hz] and damping ratio are those of that part
+    with the rest held.
     """
 
     share: float
@@ -38,12 +38,12 @@ class StructureMode:
 
 @dataclass(frozen=True)
 class Between:
-    """What lies between the force that is commanded and the bearing.
+    """Elements between the commanded force and the bearing.
 
-    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] are the drive's. `mass` [kg] is believed to
-    move, of which a share is `beyond` the joint; `contact` [N/m] is the stiffness of what holds the joint, and `joint`
-    [N/m] that of the joint itself. `mode` is that of the structure. `viscous` holds the viscous friction [N s/m] and
-    the half-width of its interval.
+    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] are the drive's. `mass` [kg] is the assumed
+    moving mass, of which the fraction `beyond` is beyond the joint; `contact` [N/m] is the stiffness of what holds the
+    joint, and `joint` [N/m] that of the joint itself. `mode` is that of the structure. `viscous` has the viscous
+    friction [N s/m] and the half-width of its interval.
     """
 
     delay: float | None = None
@@ -57,14 +57,14 @@ class Between:
 
 
 DIRECT = Between()
-"""Nothing lies between; the delay is not known."""
+"""The case without anything in between; the delay is not known."""
 
 
 def machine_between(flat: Mapping[str, Any]) -> Between:
-    """Return what lies between the commanded force and the bearing, from a stage's flat keys.
+    """Return the elements between the commanded force and the bearing, from a stage's flat keys.
 
-    A joint counts as held by its limiter. The frequency of the parasitic mode is that of both parts of the stage's
-    mass against each other; with one part held, the frequency of the other on the spring is lower.
+    A joint counts as held by its limiter. The parasitic frequency is that of both parts of the stage's mass against
+    each other; with one part held, that of the other is lower.
     """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
@@ -87,7 +87,7 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 
 
 def believed_between(prior: Prior, log: Log) -> Between:
-    """Return what lies between force and bearing, from other experiments or the stage file.
+    """Return the elements between force and bearing, from other experiments or the stage file.
 
     The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError.
     """
@@ -116,11 +116,11 @@ class BearingRecord:
 
     @property
     def body(self) -> np.ndarray:
-        """Position [m] of the body on the bearing, shape (n,), but for what a contact gives."""
+        """Return the position [m] of the body on the bearing, shape (n,), apart from the deflection of a contact."""
         return self.position if self.bent is None else self.position - self.bent
 
     def beginning(self, count: int) -> BearingRecord:
-        """Return the first so many samples."""
+        """Return the first `count` samples."""
         bent = None if self.bent is None else self.bent[:count]
         return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
 
@@ -144,7 +144,7 @@ class LowPass:
 
     @property
     def inside(self) -> slice:
-        """The samples which the ends of the record do not touch."""
+        """Return the samples that the filter's transients at the ends do not affect."""
         edge = int(ReadingSettings.current().periods_of_an_edge / (self.cutoff * (self.time[1] - self.time[0])))
         return slice(edge, len(self.time) - edge)
 
@@ -165,7 +165,7 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Say why a record is not usable, if it has too few samples or no force; "" if it is."""
+    """Return why a record is not usable (too few samples or no force); "" if it is usable."""
     settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
@@ -200,8 +200,8 @@ def cutoff_of(record: BearingRecord) -> float:
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return position [m], force [N] and acceleration [m/s^2] at the bearing, each (n,).
 
-    The force is the one that has arrived there. The acceleration belongs to the whole moving mass: inertia is that
-    mass times it. `mass` [kg] counts where a contact gives way, by the force that goes through it.
+    The force is delayed to its arrival. The acceleration times the whole moving mass is the inertia. `mass` [kg]
+    determines the force through a compliant contact.
     """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
@@ -220,7 +220,7 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """Return the measured deflection [m] of a joint that bends.
 
-    None where it is not measured, or where it is held and about what its contact `gives` [m].
+    None if it is not measured, or if it is held and about what its contact `gives` [m].
     """
     settings = ReadingSettings.current()
     measured = deflection(log)
@@ -243,7 +243,7 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """Return the force [N] that a command [N], shape (n,), becomes after delay and current loop."""
+    """Return the force [N] that arrives from a command [N], shape (n,), after delay and current loop."""
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late

@@ -1,4 +1,4 @@
-"""What the experiments in time share: checked channels, zero-phase filters, and means whose samples are correlated."""
+"""Provide checked channels, zero-phase filters, and means of correlated samples for experiments in time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 ORDER = 2
-"""Order of the low-pass filter, which goes over the record forth and back: 4 in all."""
+"""Order of the low-pass filter, which is applied forward and back: 4 in total."""
 
 NORMAL_MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
@@ -30,7 +30,7 @@ _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit positio
 def record(name: str, sample_time: float, **signals: Any) -> Log:
     """Make a log of plain SI arrays by role, without gaps, `sample_time` [s] apart.
 
-    Raises InputError for what is none.
+    Raises InputError for invalid arrays.
     """
     arrays = {role: np.asarray(values, dtype=float) for role, values in signals.items()}
     for role, values in arrays.items():
@@ -144,7 +144,7 @@ def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
 
 
 def robust(values: np.ndarray) -> float:
-    """Return the standard deviation of most values, by the median absolute deviation; 0 of none."""
+    """Return a robust standard deviation by the median absolute deviation; 0 without values."""
     if not len(values):
         return 0.0
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
@@ -153,7 +153,7 @@ def robust(values: np.ndarray) -> float:
 def noise_of(signal: np.ndarray) -> float:
     """Return the standard deviation of the noise of a force [N] or a position [m], shape (n,).
 
-    It is that of what neighbouring samples do not share, as its third differences show it, or of its digits.
+    It is the part that neighbouring samples do not share, by third differences, or that of the resolution.
     """
     rough, digit = np.abs(np.diff(signal, 3)), digit_of(signal)
     white = NORMAL_MAD * _median(rough, digit) / np.sqrt(20) if rough.size else 0.0
@@ -161,9 +161,9 @@ def noise_of(signal: np.ndarray) -> float:
 
 
 def _median(sizes: np.ndarray, digit: float) -> float:
-    """Return the median of sizes that were rounded to whole digits, as of grouped data.
+    """Return the median of sizes that were rounded to multiples of `digit`, as of grouped data.
 
-    Each size stands for all within half a digit, none of which is below 0.
+    Each size stands for all within half a step, none of which is below 0.
     """
     middle = float(np.median(sizes))
     low = max(middle - digit / 2, 0.0)
@@ -172,10 +172,10 @@ def _median(sizes: np.ndarray, digit: float) -> float:
 
 
 def digit_of(signal: np.ndarray) -> float:
-    """Return the digit of a signal, shape (n,).
+    """Return the resolution of a signal, shape (n,).
 
-    It is that of the levels at which the signal stays, where these are whole numbers of digits apart, which an
-    interpolation between instants leaves as they are; else the smallest step.
+    It is the spacing of the levels at which the signal stays, if these are multiples of one step, which interpolation
+    does not change; else the smallest step.
     """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
@@ -238,9 +238,9 @@ def block_mean(values: np.ndarray) -> Mean:
 
 
 def correlated_mean(values: np.ndarray) -> Mean:
-    """Return the mean of values in a row, of which each may resemble the one before.
+    """Return the mean of values in a row that may be correlated with their predecessors.
 
-    The degrees of freedom are those of as many independent ones, by a first-order autoregression.
+    The degrees of freedom are those of the equivalent number of independent values, by a first-order autoregression.
     """
     settings = ReadingSettings.current()
     count = len(values)
@@ -262,10 +262,7 @@ def t_value(freedom: float) -> float:
 
 
 def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
-    """Make an estimate with Student's interval, widened by systematic errors.
-
-    They are `low` below and `high` above the mean.
-    """
+    """Make an estimate with Student's interval, widened by systematic errors `low` below and `high` above the mean."""
     half = t_value(mean.freedom) * mean.error
     ends = (mean.value - half - low, mean.value + half + high)
     return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
@@ -301,8 +298,8 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
     """Return the correlation (p, p) of quantities with a covariance and systematic errors.
 
-    Systematic `shifts`, shape (m, p), move the quantities together, and doubts of half-width `even`, shape (p,), each
-    by itself.
+    Systematic `shifts`, shape (m, p), move the quantities together; errors of half-width `even`, shape (p,), are
+    independent.
     """
     total = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
     size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
@@ -310,10 +307,10 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Return the deflection [m] of bristles, shape (n,), under a body that moves.
+    """Return the deflection [m] of bristles, shape (n,), under a moving body.
 
-    The moves [m] have the shape (n - 1,). At their velocities the bristles come to rest at `ends` [m], shape (n - 1,);
-    they begin from the deflection `start` [m]. The solution is exact in each move.
+    The moves [m] have the shape (n - 1,). At their velocities the bristles approach `ends` [m], shape (n - 1,); they
+    start from the deflection `start` [m]. The solution is exact in each move.
     """
     kept = np.exp(-np.abs(moves) / ends)
     after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
@@ -322,7 +319,7 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
 
 
 def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield either direction by name, with the mask of what belongs to it."""
+    """Yield each direction by name, with the mask of its samples."""
     yield "forward", directions > 0
     yield "backward", directions < 0
 
@@ -330,7 +327,7 @@ def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 def stribeck_curve(
     speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
 ) -> np.ndarray:
-    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, not the viscous part.
+    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, without the viscous part.
 
     Arguments are Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
     """

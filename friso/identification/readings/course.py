@@ -1,4 +1,4 @@
-"""How a log goes that nobody has named: whether its reference moves, and what repeats in it."""
+"""Describe the course of a log without a stated kind: whether its reference moves, and what repeats."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from friso.identification.response.period import find_periods
 
 @dataclass(frozen=True)
 class Repetition:
-    """What repeats in a log.
+    """Repetition in a log.
 
-    It repeats every so many `samples`, with about so many `harmonics`, and turns so many times in between, while the
-    position rests for a share of the time.
+    The period is `samples` long, with about so many `harmonics` and turns, while the position rests for a fraction of
+    the time.
     """
 
     samples: int
@@ -33,26 +33,23 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Course:
-    """How a log goes of which nobody has said what experiment it is."""
+    """Course of a log without a stated kind of experiment."""
 
     log: Log
 
     @property
     def reference_moves(self) -> bool:
-        """Whether there is a reference that is not constant."""
+        """Tell whether there is a reference that is not constant."""
         return "reference" in self.log and bool(np.ptp(self.log["reference"][self.log.longest]) > 0)
 
     @property
     def signal(self) -> str:
-        """Return the role of the signal that drives the log.
-
-        It is the injected force, or a moving reference, or else the force.
-        """
+        """Return the role of the signal that drives the log: injected force, moving reference, or force."""
         return external(self.log) or "force"
 
     @cached_property
     def repetition(self) -> Repetition | None:
-        """What repeats in the driving signal; None where nothing does."""
+        """Return the repetition of the driving signal; None without one."""
         part = self.log.longest
         try:
             periods = find_periods(self.log[self.signal][part])
@@ -64,9 +61,9 @@ class Course:
 
     @cached_property
     def speeds(self) -> np.ndarray:
-        """The constant speeds [m/s], shape (n,), where most of the way goes at such.
+        """Return the constant speeds [m/s], shape (n,), if most of the way is covered at such speeds.
 
-        No reference tells them; there are none where the position has no SI unit.
+        The reference is not used; the result is empty if the position has no SI unit.
         """
         settings = ReadingSettings.current()
         part, position = self.log.longest, self.log["position"]
@@ -81,10 +78,9 @@ class Course:
 
     @cached_property
     def ramps(self) -> int:
-        """How often the force rises evenly from none until the body moves off.
+        """Return how often the force rises evenly from zero until the body moves off.
 
-        That counts where it is most of what happens and no reference moves; 0 where it is not, or where the position
-        has no SI unit.
+        The result is 0 if this is not most of the log, if a reference moves, or if the position has no SI unit.
         """
         settings = ReadingSettings.current()
         log = self.log
@@ -106,7 +102,7 @@ class Course:
         settings = ReadingSettings.current()
 
         def mean(first: float, last: float) -> float:
-            """Over some part of the way, as a share of the force."""
+            """Return the mean force over a part of the rise, relative to the whole."""
             edges = np.searchsorted(self.log.time, at - lasts * (1 - np.array([first, last])))
             values = self.log["force"][edges[0] : edges[1]]
             return float(values.mean()) / force if values.size else 0.0
@@ -118,15 +114,15 @@ class Course:
 
     @property
     def one_way(self) -> bool:
-        """Whether most of the way goes in one direction, with stops or not."""
+        """Tell whether most of the way goes in one direction, with or without stops."""
         settings = ReadingSettings.current()
         position = uniform_filter1d(self.log["position"][self.log.longest], settings.samples_of_a_blur)
         return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
-        """Tell whether the force changes less over a stretch than it holds the body back.
+        """Tell whether the force changes less over a stretch than it is.
 
-        Else a spring, as bristles are before they slide, sets the speed at which a force that rises moves the body.
+        Otherwise a spring, such as bristles before sliding, determines the speed.
         """
         force = self.log["force"][stretch.span]
         half = len(force) // 2
@@ -150,13 +146,13 @@ class Course:
 
     @property
     def repeats(self) -> str:
-        """What repeats, in words; "" for nothing."""
+        """Return in words what repeats; "" for nothing."""
         repetition = self.repetition
         return f"the {self.signal} repeats every {repetition.samples} samples" if repetition else ""
 
     @property
     def words(self) -> str:
-        """How the log goes, in words."""
+        """Return the course of the log in words."""
         repetition = self.repetition
         if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"
@@ -165,10 +161,7 @@ class Course:
 
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
-    """Tell whether forces at places of successive rests, shape (n,), rise as a spring's do.
-
-    They must do so from whichever side a place was reached.
-    """
+    """Tell whether forces at places of successive rests, shape (n,), rise as a spring's do, from either side."""
     settings = ReadingSettings.current()
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
@@ -189,10 +182,7 @@ def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
 
 
 def external(log: Log) -> str | None:
-    """Return the role of the signal that moves a loop from outside; None if there is none.
-
-    It is the injected force or else a reference that moves.
-    """
+    """Return the role of the external signal of a loop: injected force or moving reference; None without one."""
     roles = ("disturbance", "reference")
     return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
@@ -200,16 +190,16 @@ def external(log: Log) -> str | None:
 def _harmonics(period: np.ndarray) -> float:
     """Return the effective number of harmonics of one period of a signal, shape (samples,).
 
-    It is the number of harmonics of equal power that would spread as much.
+    It is the number of harmonics of equal power with the same spread.
     """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))
 
 
 def _rest(position: np.ndarray, samples: int) -> float:
-    """Return the share of the time in which the position hardly moves for a tenth of a period.
+    """Return the fraction of time in which the position hardly moves for a tenth of a period.
 
-    A sine does so at no time: about its turning points it moves by 2.4 % of its travel.
+    It is 0 for a sine, which moves by 2.4 % of its travel about its turning points.
     """
     size = max(samples // 10, 2)
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
@@ -217,7 +207,7 @@ def _rest(position: np.ndarray, samples: int) -> float:
 
 
 def _turns(period: np.ndarray) -> int:
-    """Count how often a signal turns back within one period by a share of its range."""
+    """Count how often a signal turns back within one period by a fraction of its range."""
     least, turns, direction, last = ReadingSettings.current().range_share_of_a_turn * np.ptp(period), 0, 1.0, period[0]
     for value in period:
         if (value - last) * direction > 0:

@@ -1,7 +1,7 @@
-"""Friction against the place on the rail, at constant speed, and whether it can be read off at all (thesis, Fig. 21).
+"""Read friction over the place on the rail, at constant speed, and decide whether it can be read (thesis, Fig. 21).
 
-The actuator force is friction only where the motion is steady and the loop quick enough to follow; that it is friction
-of the rail, and not the loop's own swinging, shows in that passes over the same places repeat it.
+The actuator force is friction only if the motion is steady and the loop fast enough; it is friction of the rail, not
+oscillation of the loop, if passes over the same places repeat it.
 """
 
 from __future__ import annotations
@@ -37,9 +37,8 @@ class Harmonic:
 class PassMap:
     """Friction along the rail in one pass.
 
-    It has the velocity [m/s]; the force [N] over `places` [m], NaN where the pass was not, both of one shape; mean
-    force and standard deviation about it [N], correlation length [m]; the strongest harmonics; and whether the motion
-    was steady.
+    It has the velocity [m/s]; the force [N] over `places` [m], NaN outside the pass; mean force and standard deviation
+    [N], correlation length [m]; the strongest harmonics; and whether the motion was steady.
     """
 
     velocity: float
@@ -70,7 +69,7 @@ class FrictionPosition:
 
     @property
     def repeats(self) -> bool:
-        """Whether passes over the same places repeat the force: only then it is one of the places."""
+        """Tell whether passes over the same places repeat the force, which then depends on the place."""
         settings = ReadingSettings.current()
         return self.repeatability.determined and self.repeatability.value >= settings.correlation_of_passes
 
@@ -78,8 +77,8 @@ class FrictionPosition:
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
     """Read friction along the rail from passes at constant velocity, without inertia.
 
-    Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also asks whether it is
-    quick enough for the oscillations seen. Raises InputError for missing channels.
+    Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also considers whether it is
+    fast enough for the oscillations seen. Raises InputError for missing channels.
     """
     settings = ReadingSettings.current()
     stretches = passes(log)
@@ -208,7 +207,7 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 
 def _no_repeatability(reason: str) -> Estimate:
-    """Return the repeatability where it is not shown, with the reason."""
+    """Return the repeatability as not determined, with the reason."""
     return Estimate.unknown(
         "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
@@ -235,7 +234,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
 
 
 def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
-    """Return by how much the force varies [N] in passes at each speed [mm/s], the slowest first."""
+    """Return the variation of the force [N] in passes at each speed [mm/s], the slowest first."""
     spreads: dict[str, list[float]] = {}
     for m in sorted(maps, key=lambda m: abs(m.velocity)):
         spreads.setdefault(f"{abs(m.velocity) * 1e3:.3g}", []).append(m.spread)
@@ -248,7 +247,7 @@ def _from_to(values: list[float]) -> str:
 
 
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
-    """Tell whether the force is the friction of the rail, and why not, in a sentence."""
+    """Tell whether the force is the friction of the rail, with a sentence."""
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:

@@ -1,4 +1,4 @@
-"""Friction against velocity from stretches of constant velocity: Coulomb, viscous and, where it shows, Stribeck."""
+"""Read friction over velocity from stretches of constant velocity: Coulomb, viscous and, if it shows, Stribeck."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Direction:
     """Friction over speed in one direction, or in both together.
 
     It has Coulomb [N], viscous [N s/m] and static [N] friction, Stribeck velocity [m/s] and exponent, with the
-    covariance of those fitted (in that order, SI), shape (2, 2), (4, 4) or (5, 5), or (0, 0); and the `curve`, None
-    where a straight line does as well.
+    covariance of the fitted ones (in that order, SI), shape (2, 2), (4, 4) or (5, 5), or (0, 0); and the `curve`, None
+    if a straight line fits as well.
     """
 
     coulomb: Estimate
@@ -38,11 +38,10 @@ class Direction:
 
 @dataclass(frozen=True)
 class FrictionVelocity:
-    """Friction over speed, in both directions, with what it was read from.
+    """Friction over speed, in both directions, with its data.
 
-    The directions "forward" and "backward" each have what constant force there is in their Coulomb friction; `both`
-    together have that taken out, and `bias` [N] is the constant force on the body as in the stage file, beside equal
-    friction.
+    The directions "forward" and "backward" include the constant force in their Coulomb friction; `both` together
+    exclude it, and `bias` [N] is the constant force on the body as in the stage file.
 
     Per steady stretch, shape (n,), there are velocity [m/s], mean force [N] less inertia and half-width of its 95 %
     interval [N]; `unsteady` are velocities of stretches that were not steady, shape (m,), and `places` [m] the ends
@@ -61,12 +60,12 @@ class FrictionVelocity:
 
 
 def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
-    """Read friction over speed from stretches of constant velocity, over the places they share.
+    """Read friction over speed from stretches of constant velocity, over their common places.
 
-    All places are used if they share too few. Inertia, `mass` [kg] times remaining acceleration, is subtracted. The
-    Stribeck curve has the `exponent` of the stage unless the forces refute it; otherwise all intervals allow for every
-    exponent that the forces leave possible. What the speeds cannot show is unknown, with the reason. Raises InputError
-    for missing channels.
+    All places are used if the common ones are too few. Inertia, `mass` [kg] times remaining acceleration, is
+    subtracted. The Stribeck curve has the `exponent` of the stage unless the forces refute it; otherwise all intervals
+    allow for every exponent that the forces permit. Quantities that the speeds cannot show are unknown, with the
+    reason. Raises InputError for missing channels.
     """
     stretches = passes(log)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
@@ -92,10 +91,9 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
-    """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
+    """Return velocity [m/s], friction [N] without inertia, its half-width [N], and relative swing of a pass.
 
-    Friction is force without inertia. The mean of a curve over a swing is off by the square of the swing, as a share
-    of how far the curve falls.
+    The mean of a curve over a swing is off by the square of the swing, relative to the fall of the curve.
     """
     return (
         stretch.velocity,
@@ -138,10 +136,9 @@ def _together(
 
 
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return the standard deviation [N] of each stretch, at least as large as the median.
+    """Return the standard deviation [N] of each stretch, at least the median, from half-widths `errors` [N].
 
-    It follows from half-widths `errors` [N]. A stretch where the velocity swings counts less; one that happens to be
-    even does not count more than the others.
+    A stretch whose velocity swings counts less; one that happens to be even does not count more.
     """
     least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
     return np.maximum(errors, least) / COVERAGE
@@ -151,7 +148,7 @@ def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple
     """Fit friction by weighted least squares with Coulomb friction in the first column.
 
     Returns solution, covariance and degrees of freedom. Friction varies from place to place, and all stretches lie over
-    the same places: what one of them shows of Coulomb friction is not averaged out over the others.
+    the same places, so errors of the level of friction do not average out.
     """
     deviations = _deviations(forces, errors)
     inverse = np.linalg.pinv(design / deviations[:, None]) / deviations
@@ -166,8 +163,8 @@ def _covariance(
 ) -> np.ndarray:
     """Return the covariance of a solution, by the `inverse` of its design.
 
-    `scatter` is the variance over that of the `deviations` [N], which counts where it is greater than 1; `levels` are
-    the places of what is a level of friction.
+    `scatter` is the variance over that of the `deviations` [N], which counts if it is greater than 1; `levels` are the
+    columns for levels of friction.
     """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
@@ -181,7 +178,7 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
 
 
 def _nothing(reason: str) -> Direction:
-    """Return a direction of which nothing is known, for a reason."""
+    """Return a direction without estimates, with the reason."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
     coulomb, viscous, static, velocity, exponent = unknown
@@ -257,8 +254,7 @@ def distinct(speeds: np.ndarray) -> int:
 def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:
     """Bound Coulomb and viscous friction where friction still falls with the speed.
 
-    A Stribeck effect at the speeds at hand makes the start of a straight line through the forces too high and its slope
-    too low.
+    A Stribeck effect makes the intercept of a straight line through the forces too high and its slope too low.
     """
     high = Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high)
     low = Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low)
@@ -273,9 +269,9 @@ def _fitted(
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
-    """Make estimates for a direction from a Stribeck curve, with intervals for what stays open.
+    """Make estimates for a direction from a Stribeck curve, with intervals that include open parameters.
 
-    Static friction and Stribeck velocity are shown only if speeds reach below the Stribeck velocity.
+    Static friction and Stribeck velocity are determined only if speeds reach below the Stribeck velocity.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:
@@ -298,7 +294,7 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
 
 
 def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) -> Estimate:
-    """Make an estimate from a range; it is not determined where there is a `reason`."""
+    """Make an estimate from a range; it is not determined if there is a `reason`."""
     key = f"friction.{name}"
     if reason:
         return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)

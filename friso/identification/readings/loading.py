@@ -1,4 +1,4 @@
-"""Stiffness of the joint in slow motion: while the cart sticks, a stage that creeps on loads the joint."""
+"""Estimate the joint's stiffness in slow motion: while the cart sticks, the creeping stage loads the joint."""
 
 from __future__ import annotations
 

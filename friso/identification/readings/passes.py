@@ -134,7 +134,7 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
     """Return the stretches of a mask without their ends.
 
-    Both ends are cut by what the filter smears, and the start by a further share to settle.
+    Both ends are cut by what the filter smears, and the start by a further fraction to settle.
     """
     settings = ReadingSettings.current()
     edge, least = (

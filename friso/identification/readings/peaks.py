@@ -1,7 +1,7 @@
-"""The greatest friction before a body breaks away, read out of noise: how far to smooth, and what that leaves unknown.
+"""Find the largest friction before a break-away in noise, with the best smoothing and its uncertainty.
 
 A maximum over noise reads high, by up to about sqrt(2 ln n) deviations of n independent values; a smoothed peak reads
-low, by what the force rises within the reach of the smoothing. Smoothing is chosen so that both together are least.
+low, by the rise of the force within the smoothing. The smoothing is chosen to minimise both together.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from scipy.ndimage import gaussian_filter1d
 from friso.identification.readings.settings import ReadingSettings
 
 LOSS = 2.2
-"""A ramp that ends in a sudden fall loses at its smoothed peak so many times its rise R w within one deviation w of the
-Gaussian, where it falls by 10 R w (least over k of k Phi(k) + phi(k) + 10 Phi(-k), of the normal distribution; 1.8 for
-a fall by 5 R w, 2.8 for one by 50), and less where it falls gradually."""
+"""Loss of a smoothed peak of a ramp that ends in a sudden fall, in units of its rise R w within one deviation w of the
+Gaussian. It holds for a fall by 10 R w (least over k of k Phi(k) + phi(k) + 10 Phi(-k), of the normal distribution;
+1.8 for a fall by 5 R w, 2.8 for one by 50); a gradual fall loses less."""
 
 GAUSSIAN = 0.1325
-"""Deviation of a Gaussian in time times the frequency at which it halves the power: sqrt(ln 2) / (2 pi)."""
+"""Standard deviation of a Gaussian in time, times the frequency at which it halves the power: sqrt(ln 2) / (2 pi)."""
 
 
 @dataclass(frozen=True)
 class Peak:
-    """The greatest friction in a break-away: its sample, its level [N], and its uncertainty [N]."""
+    """Largest friction in a break-away: its sample, its level [N], and its uncertainty [N]."""
 
     at: int
     level: float
@@ -64,11 +64,11 @@ def peak(
     marks: tuple[int, int],
     cutoff: float,
 ) -> Peak:
-    """Find the greatest friction before a body breaks away.
+    """Find the largest friction before a body breaks away.
 
-    That is the force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and in
-    the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The force
-    rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts.
+    It is the force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and in the
+    direction of the motion, between two `marks` (indices), over the first half of which the body rests. The force rises
+    at `rising` [N/s]; nothing above the `cutoff` [Hz] counts.
     """
     settings = ReadingSettings.current()
     begin, start = marks

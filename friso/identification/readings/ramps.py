@@ -1,4 +1,4 @@
-"""Ramps of the force from rest, each until the body moves off: how much friction there is as motion begins."""
+"""Find force ramps from rest until the body moves off, and read the friction at the start of motion."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ class Ramps:
     """Ramps of the force from rest, each until the body moves off.
 
     Per ramp, shape (n,), there are time [s], place [m], direction, break-away force [N] in that direction, force rate
-    [N/s], by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large
-    where the mass is not known, and the speed [m/s] that the body has at most by then. `threshold` [m/s] is that of the
-    speed.
+    [N/s], the error [N] of that force by noise and smoothing to either side, its possible excess if the mass is not
+    known, and the highest speed [m/s] of the body by then. `threshold` [m/s] is that of the speed.
     """
 
     times: np.ndarray
@@ -106,6 +105,6 @@ def _lowest(push: np.ndarray) -> float:
 
 
 def _half(push: np.ndarray) -> int:
-    """Return the last sample at which a push, shape (n,), smoothed, is below half of its rise."""
+    """Return the last sample at which a smoothed push, shape (n,), is below half of its rise."""
     smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

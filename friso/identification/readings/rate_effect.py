@@ -1,9 +1,9 @@
-"""From break-away forces to static friction: the faster the force rises, the lower it breaks away.
+"""Estimate static friction from break-away forces, which fall with the rate of the force.
 
 While the force rises at a rate R the bristles creep at a speed v with F = g(v) (1 - R/(sigma_0 v)), from LuGre with
-dz/dt = R/sigma_0; the greatest F of all speeds is where it breaks away. It lies below F_s by a part that grows as
-R^(2/3) while it is small (g expanded to second order in v/v_s); its share hangs on R/(sigma_0 v_s) and F_c/F_s alone.
-Inertia, left out here, only delays: break-away is no lower (Canudas de Wit et al. 1995, doi:10.1109/9.376053, Fig. 3).
+dz/dt = R/sigma_0; break-away is the largest F over all speeds. It lies below F_s by a part that grows as R^(2/3) while
+it is small (g expanded to second order in v/v_s) and depends on R/(sigma_0 v_s) and F_c/F_s only. Inertia, left out
+here, only delays: break-away is no lower (Canudas de Wit et al. 1995, doi:10.1109/9.376053, Fig. 3).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from friso.identification.readings.settings import ReadingSettings
 from friso.quantities import percent
 
 _SPEEDS = np.geomspace(1e-4, 10, 2001)
-"""Speeds over Stribeck velocity among which the greatest force is sought."""
+"""Speeds over Stribeck velocity among which the largest force is searched."""
 
 
 def break_away(
@@ -31,10 +31,10 @@ def break_away(
 
 
 def share_below(force_rate: float) -> float:
-    """Return how far break-away may lie below static friction at a force rate [N/s], as a share.
+    """Return how far break-away may lie below static friction at a force rate [N/s], as a fraction.
 
     It holds for any Coulomb friction, if bristle stiffness times Stribeck velocity is at least the value in the
-    settings. Returns 1 for rates so high that nothing can be said.
+    settings. Returns 1 for rates at which nothing can be concluded.
     """
     return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
 
@@ -62,7 +62,7 @@ def static_friction(
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
     """Estimate static friction from one rate: the mean break-away is too low by at most a bound.
 
-    Half of the bound is put in the value.
+    Half of the bound is added to the value.
     """
     settings = ReadingSettings.current()
     mean = correlated_mean(forces)
@@ -93,10 +93,10 @@ def _slow_enough() -> float:
 
 
 def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None:
-    """Refuse a value where break-away clearly rises with the force rate; None where it does not.
+    """Return a bound instead of a value if break-away clearly rises with the force rate; else None.
 
-    No bristles do so. A motion that is noticed late, by the same time at all rates, makes forces rise in proportion to
-    the rate: their line at rate 0 and the forces at the lowest rates bound static friction.
+    No bristles cause that. A motion that is noticed late by a constant time makes forces rise in proportion to the
+    rate: their line at rate 0 and the forces at the lowest rates bound static friction.
     """
     if len(forces) < 4:
         return None
@@ -118,9 +118,9 @@ def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None
 
 
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3).
+    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3), fitted at the lower rates.
 
-    The line is fitted at the lower rates. Half of the way extrapolated widens the interval.
+    Half of the extrapolated distance widens the interval.
     """
     settings = ReadingSettings.current()
     rises = _rising(name, forces, rates)

@@ -9,123 +9,123 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReadingSettings(Settings):
-    """What is read off logs: passes, slips, ramps, friction over speed and place."""
+    """Settings of readings: passes, slips, ramps, friction over speed and place."""
 
     # The body on the bearing, from what the drive commands and the sensor sees.
     points_per_sample: int = setting(8, "")
-    """Points per sample for a mode of the structure: one of a tenth of the sampling rate is off by 0.05 %."""
+    """Points per sample when a structural mode is simulated. One of a tenth of the sampling rate is off by 0.05 %."""
 
     periods_of_a_record: int = setting(20, "")
-    """Periods of the low-pass that a record lasts at least."""
+    """Shortest record, in periods of the low-pass."""
 
     sampled_frequency: float = setting(0.2, "")
-    """Highest frequency of the motion over that of the samples that a spline still follows."""
+    """Highest frequency of the motion, over the sampling frequency, that a spline follows."""
 
     share_left_unexplained: float = setting(0.2, "")
-    """Share of the friction's deviation that a model may leave unexplained."""
+    """Largest residual of a useful model, over the standard deviation of friction."""
 
     periods_of_an_edge: float = setting(2.0, "")
-    """Periods of the low-pass at either end of a record that its ends touch."""
+    """Ends of a record that the low-pass distorts, in its periods."""
 
     deviations_of_seen_motion: float = setting(10.0, "")
-    """Deviations of the noise that those of the motion have to reach to be seen."""
+    """Smallest visible motion, in standard deviations of the noise."""
 
     rounding_of_a_position: float = setting(1e-9, "")
-    """Share of the largest position that a motion has to exceed: less is rounding."""
+    """Largest motion that is rounding, relative to the largest position."""
 
     deflection_share_of_bending: float = setting(0.02, "")
-    """A joint bends where its deflection reaches this share of the motion."""
+    """Smallest deflection of a joint that bends, relative to the motion."""
 
     deviations_of_bending: float = setting(3.0, "")
-    """Deviations of its sensor's noise that the deflection reaches then."""
+    """Smallest deflection of a joint that bends, in standard deviations of the sensor's noise."""
 
     contact_ratio_of_bending: float = setting(3.0, "")
-    """Times what the contact that holds the joint gives that the deflection reaches then."""
+    """Smallest deflection of a joint that bends, relative to that of the contact that holds it."""
 
     # Means, noise and digits of signals.
     blocks_of_a_mean: int = setting(8, "")
-    """Blocks of a stretch for its mean: enough for an interval, each long enough to forget the last."""
+    """Blocks of a stretch for its mean. Each must be long enough to forget the previous one."""
 
     linearity_of_sensors: float = setting(1e-3, "")
-    """Share by which the ratio of two channels may be off: linearity of good sensors and amplifiers."""
+    """Relative error of the ratio of two channels, the linearity of good sensors and amplifiers."""
 
     rounding_of_a_signal: float = setting(1e-12, "")
-    """Steps below this share of a signal are rounding of numbers, no digit of a sensor."""
+    """Steps, relative to a signal, that are rounding of numbers rather than its resolution."""
 
     levels_of_a_digit: int = setting(8, "")
-    """Levels at which a signal stays, from which on these show its digit."""
+    """Levels at which a signal stays from which its resolution shows."""
 
     error_of_a_digit: float = setting(0.1, "")
-    """Share of a digit by which levels may be off it."""
+    """Largest distance of levels from multiples of the resolution, relative to it."""
 
     power_of_clear_motion: float = setting(100.0, "")
-    """Power over the noise's from which motion is seen: less is chance among many lines."""
+    """Power over the noise's from which motion is visible. Less is chance among many lines."""
 
     power_of_strong_motion: float = setting(1e-3, "")
-    """Power over the largest of the acceleration from which motion is seen."""
+    """Power over the largest of the acceleration from which motion is visible."""
 
     spectrum_share_of_noise: float = setting(0.25, "")
-    """Share of the spectrum, at its top, that is taken for noise."""
+    """Upper part of the spectrum that is taken for noise."""
 
     lines_of_a_spectrum: int = setting(1000, "")
-    """Lines of the spectrum: more resolve more and scatter more."""
+    """Lines of the spectrum. More resolve more and scatter more."""
 
     # How a log goes that nobody has named.
     range_share_of_a_turn: float = setting(0.1, "")
-    """A signal turns where it goes back by this share of its range: less is noise."""
+    """Smallest reversal of a signal that counts as a turn, relative to its range."""
 
     travel_share_of_a_rest: float = setting(0.01, "")
-    """Share of the travel within which a position rests."""
+    """Largest motion of a position at rest, relative to the travel."""
 
     share_of_most_of_a_way: float = setting(0.75, "")
-    """Share of the way that is most of it; of moves a sixth to a half goes at constant speed."""
+    """Fraction of the way that counts as most of it. Moves cover a sixth to a half at constant speed."""
 
     variance_share_of_a_spring: float = setting(0.99, "")
-    """Share of the force's variance from rest to rest that place explains where a spring holds."""
+    """Fraction of the force's variance between rests that the place explains if a spring acts."""
 
     places_of_a_spring: int = setting(4, "")
-    """Different places at least to say so."""
+    """Fewest places that show a spring."""
 
     hysteresis_of_a_spring: float = setting(0.05, "")
-    """Share of its range by which the force may depend on the side: friction depends by more."""
+    """Largest difference of a spring's force between both sides, relative to its range. Friction differs by more."""
 
     returns_to_a_place: int = setting(2, "")
-    """Places that have to be reached from both sides to say so."""
+    """Fewest places reached from both sides that show a spring."""
 
     log_share_of_a_rest: float = setting(0.01, "")
-    """Share of a log for which a position has to rest."""
+    """Shortest rest of a position, relative to the log."""
 
     log_share_of_ramps: float = setting(0.25, "")
-    """Share of a log that force ramps take together; moves begin within a few per cent of theirs."""
+    """Least part of a log that force ramps take together. Moves start within a few per cent of theirs."""
 
     force_share_off_a_line: float = setting(0.1, "")
-    """Share of its break-away force by which a ramp may be off its line."""
+    """Largest deviation of a ramp from a line, relative to its break-away force."""
 
     force_share_before_a_ramp: float = setting(0.05, "")
-    """Share by which the force may be off none before: an integrator passes zero without a rest."""
+    """Largest force before a ramp, relative to it. An integrator passes zero without a rest."""
 
     samples_of_a_blur: int = setting(20, "")
-    """Samples over which a position is averaged, for its way not to be that of its noise."""
+    """Samples over which a position is averaged before its travel is summed, against noise."""
 
     # Friction over the place on the rail.
     points_of_a_friction_map: int = setting(400, "")
-    """Places of a map over the whole travel."""
+    """Places of a friction map over the whole travel."""
 
     correlation_of_passes: float = setting(0.5, "")
     """Correlation of the maps of two passes from which they repeat each other."""
 
     fields_drawn: int = setting(300, "")
-    """Random fields for the interval of the correlation length: fewer leave its ends to chance."""
+    """Random fields for the interval of the correlation length. Fewer leave its ends to chance."""
 
     correlation_lengths_of_a_pass: float = setting(5.0, "")
-    """Correlation lengths that a pass holds for its correlation length to be shown."""
+    """Shortest pass that shows a correlation length, in correlation lengths."""
 
     harmonics_of_a_pass: int = setting(3, "")
-    """Harmonics reported of each pass."""
+    """Harmonics reported for each pass."""
 
     # Friction over speed.
     span_of_speeds: float = setting(1.5, "")
-    """Ratio of speeds from which Coulomb and viscous friction can be told apart."""
+    """Ratio of speeds from which Coulomb and viscous friction can be separated."""
 
     speeds_of_a_curve: int = setting(5, "")
     """Distinct speeds from which a curve of four parameters may be fitted."""
@@ -134,143 +134,143 @@ class ReadingSettings(Settings):
     """Ratio from which two speeds are distinct."""
 
     speeds_of_a_line: int = setting(3, "")
-    """Distinct speeds from which it shows whether friction is a straight line over them."""
+    """Distinct speeds from which a deviation from a straight line shows."""
 
     rounding_of_a_force: float = setting(1e-9, "")
-    """Share of the greatest force better than which no mean is known."""
+    """Smallest error of a mean, relative to the largest force."""
 
     # Loads of a joint between slips.
     fewest_loads: int = setting(3, "")
-    """Loads between slips at least: fewer leave no error of the stiffness."""
+    """Fewest loads between slips. Fewer give no error of the stiffness."""
 
     # Stretches of constant velocity.
     low_pass_of_passes: float = setting(25.0, "Hz")
     """Low-pass of the velocity by which constant stretches are found."""
 
     time_of_a_pass: float = setting(0.1, "s")
-    """Shortest stretch of constant velocity: the filter takes as long to settle."""
+    """Shortest stretch of constant velocity, the settling time of the filter."""
 
     samples_of_a_pass: int = setting(40, "")
-    """Samples of such a stretch at least."""
+    """Fewest samples of such a stretch."""
 
     swing_of_a_steady_pass: float = setting(0.3, "")
-    """Deviation of the velocity over its mean from which a body sticks and slips, or swings."""
+    """Largest swing of a steady velocity over its mean. With more, a body sticks and slips, or oscillates."""
 
     quick_swing_of_a_steady_pass: float = setting(0.02, "")
-    """Such a swing above the cut-off: one of 940 Hz, sampled at 1 kHz, looks 17 times slower than it is."""
+    """Largest fast swing of a steady velocity. One of 940 Hz, sampled at 1 kHz, looks 17 times slower than it is."""
 
     rounding_of_a_step: float = setting(1e-6, "")
-    """Share of the largest step of a position up to which steps are rounding."""
+    """Steps of a position that are rounding, relative to the largest one."""
 
     error_of_whole_digits: float = setting(0.1, "")
-    """How far steps in digits may be from whole numbers."""
+    """Largest distance of steps from multiples of the resolution."""
 
     power_of_a_clear_line: float = setting(20.0, "")
-    """Power over the median from which a line of a spectrum is no noise."""
+    """Power over the median from which a spectral line is no noise."""
 
     samples_in_common: int = setting(16, "")
-    """Samples of each pass on the way that all of them share."""
+    """Fewest samples of each pass on the stretch that all passes cover."""
 
     share_in_common: float = setting(0.5, "")
-    """Share of the shortest pass that all of them share, from which it is enough."""
+    """Shortest common way, relative to the shortest pass."""
 
     change_of_a_kept_velocity: float = setting(0.1, "")
-    """Share by which a body that keeps its velocity changes it within a period of the cut-off."""
+    """Largest change of a constant velocity within a period of the cut-off."""
 
     speed_share_of_creeping: float = setting(1e-4, "")
-    """Share of the greatest speed below which a body creeps: no speed that was asked for."""
+    """Speed below which a body creeps, relative to the largest one."""
 
     speed_share_of_settling: float = setting(1e-3, "")
-    """Share below which a body settles where it does not keep its velocity (our choice)."""
+    """Speed below which a body settles rather than keeps its velocity (friso's choice)."""
 
     acceleration_of_a_constant_speed: float = setting(0.02, "")
-    """Share of the reference's largest acceleration below which its velocity is constant."""
+    """Acceleration below which the reference has constant velocity, relative to its largest."""
 
     # The greatest friction before a body breaks away.
     deviations_of_a_kernel: int = setting(4, "")
-    """Deviations of the Gaussian beyond which it is cut off."""
+    """Half-width at which the Gaussian is cut off, in standard deviations."""
 
     widths_tried: int = setting(12, "")
     """Widths of the Gaussian among which one is chosen."""
 
     ramp_share_of_a_width: float = setting(0.1, "")
-    """Longest deviation of the Gaussian as a share of the ramp's second half."""
+    """Largest width of the Gaussian, relative to the second half of a ramp."""
 
     # Ramps of the force from rest.
     low_pass_of_ramps: float = setting(100.0, "Hz")
     """Low-pass of force and velocity of force ramps."""
 
     periods_of_a_ramp: float = setting(2.0, "")
-    """Periods of the low-pass that the second half of a ramp lasts for its break-away to be read."""
+    """Shortest second half of a ramp whose break-away can be read, in periods of the low-pass."""
 
     samples_of_a_ramp: int = setting(5, "")
-    """Samples of that half from which its rate is read."""
+    """Fewest samples from which the rate of a ramp is read."""
 
     smoothing_of_a_ramp: int = setting(40, "")
-    """A push is smoothed over one in so many of its samples to see where its second half begins."""
+    """Smoothing of a push, as a fraction of its samples (one in so many), to find its second half."""
 
     fewest_ramps: int = setting(3, "")
-    """Ramps that show static friction at least, or contradict a fit: fewer may be chance."""
+    """Fewest ramps that determine static friction, or contradict a fit."""
 
     samples_with_a_ramp: int = setting(20, "")
-    """Samples of a segment that may hold a ramp."""
+    """Fewest samples of a segment with a ramp."""
 
     force_share_of_a_start: float = setting(0.5, "")
-    """Share of its break-away force from below which a ramp rises: else bristles are bent already."""
+    """Largest initial force of a ramp, relative to break-away. With more, bristles are bent already."""
 
     # Break-away at the rate of a ramp.
     least_bristle_rate: float = setting(100.0, "N/s")
-    """Bristle stiffness times Stribeck velocity at least, of Canudas de Wit et al. 1995; the thesis has 160."""
+    """Least product of bristle stiffness and Stribeck velocity, of Canudas de Wit et al. 1995; the thesis has 160."""
 
     spread_of_rates: float = setting(3.0, "")
     """Ratio of force rates from which break-aways are extrapolated to rate 0."""
 
     range_of_rates: float = setting(12.0, "")
-    """Rates up to this multiple of the lowest enter: the power law holds for small rates alone."""
+    """Highest rate that is used, over the lowest. The power law holds for small rates only."""
 
     share_extrapolated: float = setting(0.15, "")
-    """Share of static friction over which it may be extrapolated, or widened by a bound."""
+    """Largest extrapolation or bound, relative to static friction."""
 
     # Slips.
     speed_share_of_a_slip: float = setting(0.1, "")
-    """Share of the highest speed from which the body slips."""
+    """Speed from which the body slips, relative to the highest."""
 
     deviations_of_a_slip: float = setting(8.0, "")
-    """Deviations of noise by which the speed of a slip stands out."""
+    """Speed of a slip in standard deviations of the noise."""
 
     time_before_a_slip: float = setting(0.05, "s")
-    """Least rest before a slip: it shows the rate at which the force rises."""
+    """Shortest rest before a slip, which shows the rate of the force."""
 
     samples_before_a_slip: int = setting(10, "")
-    """Samples of that rest at least."""
+    """Fewest samples of that rest."""
 
     speed_share_of_an_onset: float = setting(0.01, "")
-    """Share of a slip's highest speed at which its motion begins to be visible."""
+    """Speed at which the motion of a slip becomes visible, relative to its highest."""
 
     time_share_of_sliding: float = setting(0.6, "")
-    """Share of the time above the threshold from which a body slides, and does not stick and slip."""
+    """Fraction of time above the threshold from which a body slides rather than sticks and slips."""
 
     # Stribeck curves through forces at some speeds.
     chance_of_a_curve: float = setting(0.01, "")
-    """Chance below which a curve is shown, or an exponent is another than stated."""
+    """Probability below which a curve shows, or an exponent is refuted."""
 
     grid_of_velocities: int = setting(81, "")
-    """Stribeck velocities of the grid: fewer miss its valley."""
+    """Stribeck velocities of the grid. Fewer miss its valley."""
 
     grid_of_exponents: int = setting(41, "")
     """Exponents of the grid."""
 
     refinements_of_the_grid: int = setting(2, "")
-    """How often the grid is laid out again around what is possible."""
+    """Refinements of the grid around the possible region."""
 
     margin_of_the_grid: int = setting(2, "")
-    """Steps beyond what is possible: the valley may be narrower than a step."""
+    """Steps of the grid beyond the possible region."""
 
     usual_exponent: float = setting(2.0, "")
-    """Exponent with which a curve has to show alone where forces are few: another costs a parameter."""
+    """Exponent assumed for few forces, because another parameter costs too much."""
 
     ratio_below_the_slowest: float = setting(30.0, "")
-    """How far below the slowest speed a Stribeck velocity may lie."""
+    """Ratio by which a Stribeck velocity may lie below the slowest speed."""
 
     ratio_above_the_fastest: float = setting(2.0, "")
-    """How far above the fastest speed a Stribeck velocity may lie."""
+    """Ratio by which a Stribeck velocity may lie above the fastest speed."""

@@ -1,4 +1,4 @@
-"""When a body that sticks begins to slip: found by its speed, which must stand out of the noise and of what follows."""
+"""Find the starts of slips of a sticking body by its speed, which must stand out of the noise."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Slips:
-    """Where a body that sticks begins to slip.
+    """Starts of slips of a sticking body.
 
     Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
     `starts` of the slip (above the threshold), where the rest before it began, and the fastest sample. `directions` are
-    +1 or -1; `speed` [m/s] is that of the body, shape (samples,), with its `threshold` [m/s] and the share of time
+    +1 or -1; `speed` [m/s] is that of the body, shape (samples,), with its `threshold` [m/s] and the fraction of time
     above it.
     """
 

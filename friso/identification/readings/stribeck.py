@@ -1,9 +1,9 @@
-"""A Stribeck curve through the friction at constant speeds, with the intervals of its profile.
+"""Fit a Stribeck curve to friction at constant speeds, with profile intervals.
 
-At a given Stribeck velocity and exponent the curve is linear in all other parameters: the least squares of both are
-laid out over a grid, and an interval holds whatever explains the forces as well as chance allows, be the exponent what
-it may (profile likelihood). An interval by the slope at the best fit is much too narrow: another exponent with another
-velocity may leave as little.
+At a given Stribeck velocity and exponent the curve is linear in all other parameters: least squares are computed over a
+grid of both, and an interval contains every value that explains the forces within chance, for any exponent (profile
+likelihood). An interval by the slope at the best fit is much too narrow, because another exponent with another velocity
+may leave as little.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class Possible:
 
 @dataclass(frozen=True)
 class FittedStribeck:
-    """A Stribeck curve through forces at some speeds, with what these leave open.
+    """A Stribeck curve through forces at some speeds, with the remaining ranges.
 
-    Each has its range: Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent,
-    and the constant force [N] along the axis by which friction was too large forward. The covariance is that of the
-    first five (of four where the exponent was given), SI; an exponent that was given may be `refuted`.
+    The ranges are those of Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the
+    exponent, and the constant force [N] along the axis that made friction too large forward. The covariance is that of
+    the first five (of four with a given exponent), SI; a given exponent may be `refuted`.
     """
 
     coulomb: Possible
@@ -64,10 +64,10 @@ class Forces:
 
 
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
-    """Fit a Stribeck curve to forces; None where a straight line does as well.
+    """Fit a Stribeck curve to forces; return None if a straight line fits as well.
 
-    The line leaves `plain` (squares over variances). An `exponent` that is not refuted by the forces is that of the
-    curve; forces too few to tell leave all exponents possible.
+    The line leaves `plain` (squares over variances). A given `exponent` is used unless the forces refute it; too few
+    forces leave all exponents possible.
     """
     reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
@@ -146,9 +146,9 @@ class _Grid:
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
-        """Lay a grid around what is possible with `left` degrees of freedom.
+        """Return a grid around the possible region with `left` degrees of freedom.
 
-        It goes a little further where this one goes on; where no curve is possible it is this one.
+        It extends beyond this grid where the region does; if no curve is possible it is this grid.
         """
         settings = ReadingSettings.current()
         grid = self
@@ -165,7 +165,7 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """Return by how much less than chance allows each point leaves more than the best.
+        """Return how far each point is inside the limit of the possible region.
 
         `left` is the number of degrees of freedom.
         """

@@ -1,4 +1,4 @@
-"""What the frequency responses of one bench tell: lines, modes, two masses, and where friction bends them."""
+"""Analyse the frequency responses of one bench: lines, modes, two masses, and the effect of friction."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ FrequencyRange = tuple[float, float]
 
 @dataclass(frozen=True)
 class Bench:
-    """What the frequency responses of one bench show.
+    """Results from the frequency responses of one bench.
 
-    `driven` and `other` are the responses of force to position of the driven mass and, where it is measured, of the
-    other one; lines, modes and two masses are what they show between `band` [Hz]; `departs`, `drag` and `explanation`
-    say how friction bends the lower end. `aside` has, for every log, the relative errors with which the other logs'
-    model predicts its outputs. `warnings` say what was not found and why.
+    `driven` and `other` are the responses of force to position of the driven mass and, if measured, of the other one;
+    lines, modes and two masses are those within `band` [Hz]; `departs`, `drag` and `explanation` describe the effect of
+    friction at the lower end. `aside` has, for every log, the relative errors with which the other logs' model predicts
+    its outputs. `warnings` give what was not found and why.
     """
 
     logs: tuple[Log, ...]
@@ -63,9 +63,9 @@ def analyse(
 ) -> Bench:
     """Analyse a frequency response, measured or estimated from logs of one experiment.
 
-    `measured` is a response that another instrument has computed. `band` [Hz] is the band of the models (default:
-    above where friction bends the response); `period` [s] is about the period of the excitation (default: found).
-    Raises InputError if no response can be estimated.
+    `measured` is a response from another instrument. `band` [Hz] is the band of the models (default: above the effect
+    of friction); `period` [s] is about the period of the excitation (default: found). Raises InputError if no response
+    can be estimated.
     """
     settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
@@ -113,10 +113,7 @@ def _outputs(logs: Sequence[Log]) -> list[str]:
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
-    """Take over a response that another instrument has computed.
-
-    Only the scatter between its lines says how accurate it is.
-    """
+    """Convert a response from another instrument, with its accuracy by the scatter between lines."""
     output, _, unit = measured.unit.partition("/")
     unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
     return FrequencyResponse(
@@ -138,7 +135,7 @@ def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[floa
 
 
 def _attempt(warnings: list[str], label: str, function, *arguments):
-    """Return the answer of an analysis; or None, and add to the warnings why it has none."""
+    """Return the result of an analysis; or None, with the reason added to the warnings."""
     try:
         return function(*arguments)
     except InputError as error:
@@ -152,9 +149,9 @@ def _record(log: Log, output: str) -> ResponseRecord:
 
 
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
-    """Estimate a response by averaging over periods, or else by the local polynomial method.
+    """Estimate a response by averaging over periods, or by the local polynomial method if nothing repeats.
 
-    The second serves records in which nothing repeats. Channels are named as in the log.
+    Channels are named as in the log.
     """
     channels = from_log(log, "force", output)[1]
     try:
@@ -191,7 +188,7 @@ def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRan
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """Return the last line, rounding errors apart."""
+    """Return the last line, allowing for rounding errors."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -203,7 +200,7 @@ def _of_all(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to all realisations, its intervals as wide as single ones scatter."""
+    """Fit the two-mass model to all realisations, with intervals at least as wide as the scatter of single ones."""
     apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
     return widened(fit_two_mass(driven, other, band), apart)
 
@@ -228,7 +225,7 @@ def _friction(
     model: TwoMass | None,
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
-    """Return the friction that explains the departure from the mass line, and how well it does.
+    """Return the friction that explains the departure from the mass line, and the quality of that explanation.
 
     The second is the result of a simulation with that friction.
     """
@@ -264,7 +261,7 @@ def _left_out(
     band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return for each log how the model of one other log predicts it."""
+    """Return for each log the errors of another log's model."""
     if len(logs) < 2:
         return ()
     rows = []

@@ -1,12 +1,12 @@
-"""What the drive and all that lies above the band add to the response of masses: a delay, a hold, and compliances.
+"""Model the effect of drive and modes above the band on the response of masses: delay, hold, compliance.
 
-A force that is held for T at each sample acts half of T late on average, and the weaker the faster it changes: by
-sin(x)/x, x = omega T/2. The samples of the position then hold the images of the force too, at the frequencies f + k/T
-with k = +/- 1, +/- 2 and so on: a response G(f) is sampled as the sum over all k of G(f + k/T) sin(x)/(x + k pi), with
-a delay of T/2 (of the double integrator with a zero-order hold that is x^2 cos(x)/sin(x)^2 / (m s^2): Astrom,
-Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). The images move every mass that is rigid up there,
-not the driven one alone. Nothing in a log tells whether its force was held, so that T is fitted, between none and the
-sample time. Modes above the band add a compliance that is the same at all frequencies.
+A force that is held for T at each sample acts T/2 late on average, and is weaker by sin(x)/x, x = omega T/2. The
+samples of the position also contain the images of the force at the frequencies f + k/T with k = +/- 1, +/- 2 and so on:
+a response G(f) is sampled as the sum over all k of G(f + k/T) sin(x)/(x + k pi), with a delay of T/2 (of the double
+integrator with a zero-order hold that is x^2 cos(x)/sin(x)^2 / (m s^2): Astrom, Wittenmark, Computer-Controlled
+Systems, 3rd ed. 1997, section 2.3). The images move every mass that is rigid up there, not the driven one alone. A log
+does not show whether its force was held, so T is fitted, between zero and the sample time. Modes above the band add a
+compliance that does not depend on frequency.
 """
 
 from __future__ import annotations
@@ -67,6 +67,6 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 def _longest(response: FrequencyResponse, share: float) -> float:
     """Return the sample time [s] of a response.
 
-    If it is not known, return a share of the period of the highest frequency.
+    If it is not known, return a fraction of the period of the highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

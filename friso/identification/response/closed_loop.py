@@ -1,4 +1,4 @@
-"""Closed loop: whether a record is one, what that does to a direct estimate, the open loop and its crossover."""
+"""Detect closed loops in records, and compute the measured open loop and its crossovers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from friso.quantities import percent
 
 
 def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
-    """Say what suggests that a controller feeds the output back to the input; () for nothing.
+    """Return signs that a controller feeds the output back to the input; () for none.
 
     Without a loop the output's past cannot help to predict the input beyond the input's own past (Granger 1969,
-    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is taken
-    without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
+    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). The periodic part of an input
+    is removed; one that repeats exactly contains no reaction. Slow or weak loops stay undetected.
 
-    The present sample of the output counts as past, since a position cannot react to a force within the same sample;
+    The present sample of the output counts as past, because a position cannot react to a force within one sample;
     `direct` says that this output can (an acceleration).
     """
     settings = ResponseSettings.current()
@@ -58,7 +58,7 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
     """Test whether the output's past helps to predict the input.
 
-    Returns the probability of an F-test that it does not help, and the share of the input's unpredicted part that it
+    Returns the probability of an F-test that it does not, and the fraction of the input's unpredicted part that it
     explains.
     """
     settings = ResponseSettings.current()
@@ -86,7 +86,7 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Say where a direct and an indirect estimate differ by more than their deviations.
+    """Return where a direct and an indirect estimate differ by more than their deviations, in words.
 
     Both must have the same lines.
     """

@@ -1,4 +1,4 @@
-"""Where a measured response leaves a linear model at low frequency, and whether friction explains it."""
+"""Find where a measured response leaves a linear model at low frequency, and whether friction explains it."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ class Drag:
     """Spring and damper that describe how friction acts on a rigid mass at low frequency.
 
     `coulomb` is the friction level that damps as much at the velocity of this record (random, of standard deviation
-    `velocity`). `sign` is -1 if the output goes against the input. `left` is the share of the departure from the mass
-    line that they do not explain.
+    `velocity`). `sign` is -1 if the output goes against the input. `left` is the fraction of the departure from the
+    mass line that they do not explain.
     """
 
     mass: Estimate

@@ -1,4 +1,4 @@
-"""Weighted least squares of a model to responses, and how far its parameters and what follows from them are known."""
+"""Fit a model to responses by weighted least squares, with the uncertainty of its parameters."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class ResponseFit:
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
-        """Return what follows from the parameters, and its deviation to first order.
+        """Return a function of the parameters, and its deviation to first order.
 
-        It is NaN or infinite where a parameter is left open, beside whose value others overflow.
+        It is NaN or infinite for undetermined parameters, beside whose value others overflow.
         """
         steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
         beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
@@ -60,7 +60,7 @@ class ResponseFit:
     def estimate(
         self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
     ) -> Estimate:
-        """Estimate what follows from the parameters, with its interval to first order.
+        """Estimate a function of the parameters, with its interval to first order.
 
         The interval of a `positive` quantity is one of its logarithm.
         """
@@ -81,7 +81,7 @@ class ResponseFit:
 
 
 def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
-    """Return what follows from parameters; NaN where they are so large that nothing does."""
+    """Return a function of parameters; NaN if they are too large."""
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))

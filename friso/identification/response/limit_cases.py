@@ -20,10 +20,10 @@ from friso.identification.response.response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Visible:
-    """What a response shows of a stage on a cart.
+    """Features of a response of a stage on a cart.
 
-    It shows straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the cart ("stuck",
-    "sliding", or "" where it cannot be decided), and all of it in words.
+    It has straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the cart ("stuck",
+    "sliding", or "" if undecided), and all of it in words.
     """
 
     case: str
@@ -33,9 +33,9 @@ class Visible:
 
 
 def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
-    """Find which lines and modes a force-to-position response shows.
+    """Find the lines and modes of a force-to-position response.
 
-    The `modes` are fitted where they are not given.
+    The `modes` are fitted unless given.
     """
     sign = _sign(response)
     lines = [line for slope in KINDS for line in straight_lines(response, slope, sign)]
@@ -81,14 +81,14 @@ def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
 
 
 def _words(line: StraightLine) -> str:
-    """A straight line in words."""
+    """Return a straight line in words."""
     value = line.value
     text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
     return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
 
 
 def _verdict(case: str, pairs: Mapping[str, float]) -> str:
-    """The case of the cart in words."""
+    """Return the case of the cart in words."""
     kinds = [name.split()[0] for name in pairs]
     pair = any(a == "antiresonance" and b == "resonance" for a, b in pairwise(kinds))
     if case == "sliding":

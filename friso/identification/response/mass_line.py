@@ -1,7 +1,7 @@
-"""Straight lines of a response: stiffness (slope 0), damping (slope -1) and mass lines (slope -2), where they are seen.
+"""Find straight lines of a response: stiffness (slope 0), damping (slope -1) and mass lines (slope -2).
 
-A response from force to position follows 1/k, 1/(i omega d) or 1/((i omega)^2 m) there, so that its product with
-(i omega)^n is real, positive and the same on all lines of a band.
+A response from force to position follows 1/k, 1/(i omega d) or 1/((i omega)^2 m) there, so that its product with (i
+omega)^n is real, positive and constant over the band.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
 
 TURNED = np.radians(30)
-"""Phase by which a line of the band may be off, beyond its noise (delay, damping, a mode nearby)."""
+"""Largest phase deviation of a line of the band, beyond its noise (delay, damping, a mode nearby)."""
 
 KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass line"}
 """Names of the lines by minus their slope."""
@@ -61,8 +61,8 @@ def straight_lines(
 ) -> tuple[StraightLine, ...]:
     """Find bands in which a response falls with a `slope` of 0, 1 or 2.
 
-    The widest in octaves are sought first, and returned by frequency. `sign` is 1 or -1 if the direction of the input
-    is known (default: what most of the band says).
+    The widest in octaves are searched first, and returned by frequency. `sign` is 1 or -1 if the direction of the input
+    is known (default: that of most of the band).
     """
     ordered = response.at((response.frequency > 0) & (np.abs(response.response) > 0))
     bands: list[tuple[int, int, float]] = []
@@ -80,7 +80,7 @@ def straight_lines(
 
 
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
-    """Tell whether the slope of a band is told from the slopes one less and one more."""
+    """Tell whether the slope of a band can be distinguished from the next slopes."""
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
     weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
@@ -212,10 +212,7 @@ def _independent(residual: np.ndarray) -> float:
 
 
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
-    """Return the shapes in which a line may bend, (lines,): towards the nearer mode.
-
-    Both shapes are returned if there is no mode.
-    """
+    """Return the shapes in which a line may bend, (lines,), towards the nearer mode; both shapes without modes."""
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
     gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]

@@ -29,8 +29,8 @@ METHOD = "rational fit of the response"
 class Modes:
     """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    They are called "resonance 1 frequency" and the like. `order` says how the number of modes was chosen; `low_level`
-    and `high_level` are the acceleration per input below and above all modes (the mass lines), unknown without a rigid
+    They are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen; `low_level` and
+    `high_level` are the acceleration per input below and above all modes (the mass lines), unknown without a rigid
     body.
     """
 
@@ -56,7 +56,7 @@ class Modes:
 def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None) -> Modes:
     """Fit modes to a force-to-position response in a `band` [Hz] (default: all lines).
 
-    `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
+    `rigid` tells whether the mass moves freely (default: the better fit). Raises InputError for fewer than 12 lines.
     """
     settings = ResponseSettings.current()
     part = response if band is None else response.between(*band)
@@ -121,7 +121,7 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """Return the root that is nearest to a given one, as a function of the parameters."""
+    """Return a function of the parameters that gives the root nearest to a given one."""
 
     def nearest(parameters: np.ndarray) -> complex:
         candidates = poles_and_zeros(parameters, shape)[which]
@@ -131,7 +131,7 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 
 
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Return the acceleration per input, below all modes or above all modes.
+    """Return the acceleration per input, below or above all modes.
 
     Below, the rigid body moves alone; above, the residues of the modes are added.
     """

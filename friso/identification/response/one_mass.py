@@ -1,4 +1,4 @@
-"""Whether a response needs two masses, or is that of one mass as far as the record goes."""
+"""Decide whether a response needs two masses, or is explained by one."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ MASS, DRAG, SPRING, BEYOND = range(4)
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
     """Tell whether two masses explain the responses much better than one mass does.
 
-    The one mass has viscous friction and a spring to ground; both models have the same delay and compliance, and both
-    cover the band of the `model`. An F-test says whether the difference may be chance. As the mode could lie at any
-    line, the level of the test is divided by the number of lines.
+    The one mass has viscous friction and a spring to ground; both models have equal delay and compliance, and cover the
+    band of the `model`. An F-test decides whether the difference is chance; its level is divided by the number of
+    lines, because the mode could lie at any of them.
     """
     settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]

@@ -1,4 +1,4 @@
-"""The period of an input: its exact number of samples, and which samples hold whole periods of it."""
+"""Find the period of an input in samples, and the samples of whole periods."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """Return the lags at which a signal repeats but for a slip of its clock."""
+    """Return the lags at which a signal repeats except for a slip of its clock."""
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]

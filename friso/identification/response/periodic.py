@@ -1,8 +1,8 @@
-"""Responses from periodic excitation: averages over periods and realisations, noise and distortion apart.
+"""Estimate responses from periodic excitation, with noise and distortion separated.
 
-The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise is what differs
-from period to period, nonlinear distortion what differs from one random-phase realisation to another beyond that. With
-an external reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
+The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise differs from period to
+period, nonlinear distortion from one random-phase realisation to another. With an external reference (closed loop,
+indirect) both spectra are taken relative to it, which makes them comparable.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ def multisine(
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
-    """Bring realisations to the same lines, and say what there is to say of their clocks.
+    """Bring realisations to common lines, with remarks on their clocks.
 
-    Raises InputError for those that do not have them.
+    Raises InputError if they have none in common.
     """
     settings = ResponseSettings.current()
     if not records:
@@ -135,8 +135,7 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
     """Return the nonlinear distortion (lines,), from the output at lines that are not excited.
 
-    Noise is subtracted, and what the input itself contains at these lines is taken off with the interpolated response.
-    NaN if no line in the band was left free.
+    Noise is subtracted, and so is the response to the input at these lines. NaN if no line in the band was left free.
     """
     settings = ResponseSettings.current()
     places = np.flatnonzero(excited)

@@ -1,4 +1,4 @@
-"""Rational responses: a rigid body, modes and a constant behind a delay; how many modes a measured one asks for.
+"""Fit rational responses (rigid body, modes, constant, delay), and choose the number of modes.
 
 The response is R/(s (s + delta)) + sum of r_i/(s^2 + 2 zeta_i omega_i s + omega_i^2) + c, times exp(-s delay), with s
 over a scale. Modes are added one at a time, each started where it helps most; the nonlinear parameters are refined with
@@ -89,7 +89,7 @@ def _better(larger: Row, smaller: Row) -> bool:
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return what the linear parameters multiply, complex, shape (linear, lines)."""
+    """Return the factors of the linear parameters, complex, shape (linear, lines)."""
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
     parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
@@ -165,7 +165,7 @@ def _eliminated(
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """Return the model with all its parameters, and how good it is."""
+    """Return the model with all its parameters, and its criterion."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)

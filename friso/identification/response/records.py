@@ -1,4 +1,4 @@
-"""Records of a periodic experiment turned into spectra, period by period."""
+"""Turn records of a periodic experiment into spectra, period by period."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ResponseRecord:
 
     @property
     def driving(self) -> np.ndarray:
-        """The external signal: the reference, or in open loop the input."""
+        """Return the external signal: the reference, or in open loop the input."""
         return self.input if self.reference is None else self.reference
 
     def checked(self, least: int = 8) -> ResponseRecord:
@@ -103,9 +103,8 @@ class Spectra:
 def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     """Return spectra of whole periods without transient, by the external signal.
 
-    That is the reference if there is one, or the input. `period` [s] is about how long a period is. What drifts from
-    period to period is taken out beforehand. Raises InputError for what does not repeat and for fewer than two periods
-    that are left.
+    That is the reference if there is one, or the input. `period` [s] is the approximate length of a period. Drift from
+    period to period is removed first. Raises InputError if nothing repeats or fewer than two periods are left.
     """
     record = record.checked()
     expected = None if period is None else period / record.sample_time
@@ -158,10 +157,7 @@ def _slip(driving: np.ndarray, samples: int) -> float:
 
 
 def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
-    """Take a record anew every `step` samples, by cubic splines.
-
-    What these lose of high frequencies, all of its signals lose.
-    """
+    """Resample a record every `step` samples, by cubic splines, which attenuate all of its signals alike."""
     at = np.arange(int((len(record.input) - 1) / step) + 1) * step
 
     def taken(signal: np.ndarray) -> np.ndarray:
@@ -194,14 +190,14 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
 
 
 def _same_excitation(driving: np.ndarray) -> np.ndarray:
-    """Tell which periods have the same external signal as most."""
+    """Tell which periods have the external signal of most periods."""
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
 
 
 def _excited(driving: np.ndarray) -> np.ndarray:
-    """Tell which lines the external signal holds on purpose, shape (lines,)."""
+    """Tell which lines the external signal excites intentionally, shape (lines,)."""
     settings = ResponseSettings.current()
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
@@ -222,9 +218,8 @@ def _excited(driving: np.ndarray) -> np.ndarray:
 def _transient_periods(reaction: np.ndarray) -> int:
     """Count the leading periods that are transient, by the output (periods, lines).
 
-    At least three periods are kept. Each period is compared with the later half of the others. Without a transient
-    they are exchangeable, so that the first is the most distant one by chance only; the distance asked for makes that
-    rare.
+    At least three periods are kept. Each period is compared with the later half of the others. Without a transient the
+    first is the most distant one by chance only; the limit makes that rare.
     """
     count = len(reaction)
     last = max(3, count // 2)

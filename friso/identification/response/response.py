@@ -1,4 +1,4 @@
-"""The frequency response of a record: complex values on lines, and how far each can be believed."""
+"""Define the frequency response of a record: complex values on lines, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -40,13 +40,12 @@ class FrequencyResponse:
     """A response on the lines `frequency` [Hz]; all arrays have the shape (lines,).
 
     `response` is complex [output unit per input unit]. `deviation` is its standard deviation, sqrt(E|error|^2), in
-    total; `noise` and `distortion` are what noise (differs from period to period) and nonlinear distortion (differs
-    from realisation to realisation) contribute, deviation^2 = noise^2 + distortion^2 where both are known, NaN where
-    the record cannot tell them.
+    total; `noise` (differs from period to period) and `distortion` (differs from realisation to realisation) are its
+    parts, deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
 
     `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is that of input and output, or
-    None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is that of the record, None where it
-    is not known.
+    None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is that of the record, None if not
+    known.
     """
 
     frequency: np.ndarray
@@ -80,7 +79,7 @@ class FrequencyResponse:
         return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
 
     def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """Return the response to another output, by a known complex `factor` per line, (lines,)."""
+        """Return the response to another output, by an exact complex `factor` per line, (lines,)."""
         size = np.abs(factor)
         return replace(
             self,
@@ -143,7 +142,7 @@ class FrequencyResponse:
     def scatter(self) -> np.ndarray:
         """Return the deviations (lines,), raised to the scatter between neighbouring lines.
 
-        Nonlinear distortion makes the lines of one realisation scatter by more than its noise; a smooth system cannot.
+        Nonlinear distortion makes the lines of one realisation scatter beyond their noise; a smooth system cannot.
         """
         size = np.abs(self.response)
         if len(size) < 3 or not np.all(size > 0):

@@ -1,4 +1,4 @@
-"""A mass with Coulomb friction and a spring under the forces of a record: whether that explains a departure."""
+"""Simulate a mass with Coulomb friction and a spring under recorded forces, to explain a departure."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class Explanation:
-    """A simulation of friction, and what it leaves of the departure of a measured response.
+    """A simulation of friction, and its residual against the departure of a measured response.
 
-    `responses` are simulated, by the factor on the recorded input. `left` is the share of the departure from the mass
-    line, in units of the deviations, that the simulation with the recorded input leaves; 0 explains all of it, 1
+    `responses` are simulated, by the factor on the recorded input. `left` is the fraction of the departure from the
+    mass line, in units of the deviations, that the simulation with the recorded input leaves; 0 explains all of it, 1
     nothing.
     """
 
@@ -83,7 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the share of the departure from the mass line that the simulation does not explain."""
+    """Return the fraction of the departure from the mass line that the simulation does not explain."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

@@ -1,4 +1,4 @@
-"""Two masses and a joint from responses at the driven mass and, where it is measured too, at the other one."""
+"""Fit two masses and a joint to responses at the driven mass and, if measured, at the other one."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _sign(response: np.ndarray) -> float:
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
     """Check that a model is near the response, shape (outputs, lines), somewhere.
 
-    Raises InputError where it is not.
+    Raises InputError if it is not.
     """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
     if off > ResponseSettings.current().misfit_of_no_model:
@@ -233,13 +233,13 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return a start with masses, stiffness and damping as large as the response asks for."""
+    """Return a start with masses, stiffness and damping scaled to the response."""
     scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
     return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
-    """Yield what to know before believing the model."""
+    """Yield warnings for the user of the model."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
@@ -249,7 +249,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
 
 
 def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Return masses and joint, with what follows from them."""
+    """Return masses and joint, with derived quantities."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"
 

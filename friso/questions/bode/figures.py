@@ -33,31 +33,33 @@ from friso.shown.drawing.prefixes import pretty, with_unit
 from friso.stage.transmission import moving_mass
 
 QUARTER = 90.0
-"""Phases are read in quarters of a turn [deg]."""
+"""Step of phase axes [deg]: a quarter of a turn."""
 
 STARTS = -315.0
-"""The first phase [deg] begins in the turn above this one, between those of whole numbers of integrations."""
+"""Lower end [deg] of the turn in which the first phase is plotted.
+
+It lies between the phases of whole numbers of integrations."""
 
 LEAST_PHASE = -720.0
-"""Phases [deg] below this one, as of a delay at high frequencies, are left out of view."""
+"""Lower end of phase axes [deg]; the delay at high frequencies would extend them without end."""
 
 NEAR = ((-3.0, 1.5), (-1.5, 1.5))
-"""Part of the complex plane around -1 that the Nyquist plot shows."""
+"""Range of the complex plane around -1 that the Nyquist plot shows, real and imaginary."""
 
 KEPT = (0.02, 5.0)
-"""Sizes of the loop that are drawn of the family in it."""
+"""Range of the loop's size in which members of the family are drawn."""
 
 DRAWN = {True: 40, False: 12}
-"""Members of the family that are drawn there, of the stable ones and of the others."""
+"""Numbers of family members drawn, of stable (True) and of other loops (False)."""
 
 SIZES = (-90.0, 90.0)
-"""Sizes of the open loop [dB] that are in view at most."""
+"""Largest range of open-loop magnitudes [dB] on the axis."""
 
 LEAST_SENSITIVITY = -40.0
-"""Sensitivities [dB] from which on they are in view."""
+"""Lower end of sensitivity axes [dB]."""
 
 WIDTHS = {False: 2.6, True: 1.3}
-"""Widths of lines, of a free and a touched limiter: where both do the same, both are seen."""
+"""Line widths for a free (False) and a touched limiter (True); both lines are visible where they coincide."""
 
 LOST = "#eeb48f"
 

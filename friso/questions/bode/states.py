@@ -15,7 +15,7 @@ from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
 from friso.shown.drawing.prefixes import with_unit
 
 SERIES = "-series"
-"""Ends the name of a case whose limiter acts by the formula that Table 1 of the thesis prints."""
+"""Suffix of the name of a case whose limiter follows the series formula in Table 1 of the thesis."""
 
 COLOURS = {"given": BLUE, "stuck": BLUE, "sliding": VERMILLION, "stuck-touched": SKY, "sliding-touched": ORANGE}
 _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}

@@ -17,10 +17,10 @@ from friso.questions.bode.states import ShownState
 from friso.shown.drawing.prefixes import NOTHING, with_unit
 
 OF_LOOPS = ("Stable", "0 dB crossings", "Phase margin", "Gain margin", "Modulus margin")
-"""The rows of each loop of a cascade."""
+"""Names of the rows of each loop of a cascade."""
 
 ANY = "no limit"
-"""Stands where nothing takes a loop to the edge of its stability."""
+"""Text where nothing brings a loop to the edge of its stability."""
 
 
 def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:

@@ -58,22 +58,22 @@ NODES = {
 }
 
 LOST = "a change, no curve begun"
-"""Label of places between stages that differ, where no curve could be started."""
+"""Label of places between differing stages where no curve could be started."""
 
 LOST_END = "cycle not followed farther"
 """Label of ends of curves inside the range."""
 
 MEETING = "curves meet"
-"""Label of places where two curves cross, end on each other, or begin or cease to run together."""
+"""Label of places where two curves cross, end on each other, or begin or cease to coincide."""
 
 REACH = 2.5
-"""Multipliers up to which they are shown."""
+"""Largest multiplier that is shown."""
 
 LOGARITHMIC = 30.0
-"""Ratio of the largest to the smallest amplitude from which on its axis is logarithmic."""
+"""Ratio of the largest to the smallest amplitude above which the axis is logarithmic."""
 
 MARGIN = 0.02
-"""Share of a range by which the plane of two keys is drawn larger, so that nodes at its sides are seen whole."""
+"""Margin of the plane of two keys, as a fraction of a range; nodes at its sides are then fully visible."""
 
 
 def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
@@ -175,6 +175,6 @@ def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, s
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
-    """Return the axis of a key over its range, widened on both sides by a share of the range."""
+    """Return the axis of a key over its range, widened on both sides by a fraction of the range."""
     low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
     return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

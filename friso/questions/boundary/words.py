@@ -55,7 +55,7 @@ BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
 PLAIN = 1e-5
-"""Share of a value by which it may be off and still be told alone, in six digits."""
+"""Largest relative error with which a value is stated without its interval, in six significant digits."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,11 @@ class ShownKey:
 
 
 ROUGHLY = 3
-"""Digits of where a curve begins and ends, in the answer."""
+"""Significant digits of the ends of a curve in the answer."""
 
 
 SHOWN_CURVES = 3
-"""Curves, and places where they meet, that the answer tells at most; the figure and the details have all."""
+"""Largest numbers of curves, and of places where curves meet, in the answer; figure and details have all."""
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -232,7 +232,7 @@ ENDS = {
     "meets": "it meets another curve",
     "lost": "its cycle could not be followed farther",
 }
-"""How a curve of the plane ends."""
+"""Ways in which a curve of the plane ends, in words."""
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:

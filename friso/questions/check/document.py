@@ -61,7 +61,7 @@ def _isolator(isolator: Suggestion) -> dict[str, Any]:
 
 
 def _feeding(feeding: Feeding) -> dict[str, Any]:
-    """Return the shares of friction and of backlash down to which hunting lasts."""
+    """Return the fractions of friction and of backlash down to which hunting lasts."""
     parts = {"friction": feeding.friction, "backlash": feeding.backlash}
     return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 

@@ -15,10 +15,10 @@ from friso.studies.settings import StudySettings
 COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
 
 BINS = 24
-"""Bars of the figure."""
+"""Number of bars in the histogram."""
 
 MOST_LISTED = 4
-"""Most keys whose influence on the verdict the table lists."""
+"""Largest number of keys whose influence on the verdict the table lists."""
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
@@ -68,7 +68,7 @@ def _swings(fates: Fates) -> str:
 
 
 def _edge(draws: Draws) -> str:
-    """Say between which bandwidths the edge of hunting of the draws lies; "" where that is not known."""
+    """Say between which bandwidths the edge of hunting of the draws lies; "" where it is not known."""
     drawn_edges = draws.edges
     if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
         return ""
@@ -79,7 +79,10 @@ def _edge(draws: Draws) -> str:
 
 
 def _narrowed(draws: Draws) -> str:
-    """Say what to measure to narrow the ranges: the key that amplitudes follow most; "" where that is not known."""
+    """Say which measurement would narrow the ranges most; "" where it is not known.
+
+    It is that of the key that amplitudes follow most closely.
+    """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))
     if len(shown) < StudySettings.current().trial_draws or not np.ptp(fates.amplitudes[shown]) > 0:

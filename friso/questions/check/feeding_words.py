@@ -7,7 +7,7 @@ from friso.quantities import percent
 
 
 def feeding_sentences(feeding: Feeding) -> list[str]:
-    """Say whether hunting ends without friction or without backlash, and at which share."""
+    """Say whether hunting ends without friction or without backlash, and at which fraction."""
     friction, backlash = feeding.friction, feeding.backlash
     if friction is None:
         feeds = "The backlash feeds it" if backlash.needed else "The backlash does not feed it"

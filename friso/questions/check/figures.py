@@ -182,7 +182,7 @@ def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
 
 
 def _shares(cases: list[ShownCase]) -> Figure:
-    """Draw the P, I and D shares of the actuator force after the move (thesis, Fig. 13).
+    """Draw the P, I and D terms of the actuator force after the move (thesis, Fig. 13).
 
     All cases have one scale.
     """

@@ -68,7 +68,7 @@ def _multiplier(cycle: Cycle) -> str:
 
 
 def _decided(cycle: Cycle) -> str:
-    """Say over which part of a period the multiplier was computed, and how."""
+    """Say over which part of a period the multiplier was computed, and by which method."""
     method = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
     return f"{'half a' if cycle.symmetric else 'a whole'} period ({method})"
 
@@ -146,7 +146,7 @@ def _windows(kick: Kick, unit: str, searched: str) -> str:
 
 
 def _moves(case: Case) -> str:
-    """Write the share of the moves tried that end in hunting, with its interval."""
+    """Write the fraction of the moves tried that end in hunting, with its interval."""
     moves = case.judgement.moves
     if moves is None:
         return UNKNOWN if CheckPart.STARTS in case.judgement.given_up else NOTHING

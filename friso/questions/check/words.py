@@ -44,7 +44,7 @@ _UNFINISHED = (
     "could not be judged: its own run was completed, but not the longer one that shows whether it ends in the hunting "
     "that was found."
 )
-"""That what a stage does in the end is not known."""
+"""Sentence for a stage whose final behaviour is not known."""
 
 IN_SHORT: Mapping[Verdict, str] = {
     "hunts": "hunts",
@@ -55,10 +55,10 @@ IN_SHORT: Mapping[Verdict, str] = {
 """Words for the verdict on a case before its margin is known."""
 
 ONE_PLACE = 1.01
-"""Factor between the ends of a window below which it is told by its middle and its width."""
+"""Ratio of the ends of a window below which it is stated by its centre and width."""
 
 ROUGH = 5e-4
-"""Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
+"""Relative reserve of an edge from which it is mentioned, because the digits shown are then not certain."""
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
@@ -85,7 +85,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say first of all where the loop is unstable, whatever the friction, and where the drive makes it so."""
+    """State where the loop is unstable even without friction, and where the drive makes it unstable."""
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -145,7 +145,7 @@ def _hunting(case: Case) -> str:
 def _bistable(case: Case) -> str:
     """Describe a case that settles after this move but hunts after others.
 
-    The sentence names the smallest kicks and the share of moves that start hunting.
+    The sentence names the smallest kicks and the fraction of moves that start hunting.
     """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
@@ -218,7 +218,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say that the force limit keeps the stage where it stands, if it does."""
+    """Say whether the force limit keeps the stage at its place."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)
@@ -318,7 +318,7 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _unsearched(case: Case) -> list[str]:
-    """Say that the search through the bandwidths was given up, if it was."""
+    """Say that the search through the bandwidths was stopped, if it was."""
     if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
@@ -504,7 +504,7 @@ def _swing(case: Case) -> str:
 
 
 def _end(case: Case) -> str:
-    """Write what is left of the motion in the last quarter of the run."""
+    """Write the residual motion in the last quarter of the run."""
     if case.peak_to_peak < _TEN_MICRON:
         return f"at rest, but {length_at_rest(abs(case.offset))} off its reference"
     if not case.period:

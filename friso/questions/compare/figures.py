@@ -27,13 +27,13 @@ from friso.studies.compare.study import LONGER, Comparison, OptionResult
 
 _NAMES = ("ink", "blue", "vermillion", "orange", "pink", "sky", "green")
 COLOURS: dict[str, str] = dict(zip(_NAMES, (INK, BLUE, VERMILLION, ORANGE, PINK, SKY, GREEN), strict=True))
-"""Colours of options, by the names that these give."""
+"""Colours of options, by their names for colours."""
 
 BESIDE = 0.16
-"""Distance between the markers of an option, in distances between options."""
+"""Distance between the markers of one option, relative to the distance between options."""
 
 MOST = (5, 95)
-"""Percentiles between which most machines are."""
+"""Percentiles of machines that a bar spans."""
 
 
 def compare_figures(comparison: Comparison) -> list[Figure]:
@@ -93,7 +93,7 @@ def _bars(
 
 
 def _settling(comparison: Comparison, within: str) -> Panel:
-    """Return the panel of the share of machines in position over the time since the move."""
+    """Return the panel of the fraction of machines in position over the time since the move."""
     flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
     times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]

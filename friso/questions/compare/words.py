@@ -197,7 +197,7 @@ def _interrupted(comparison: Comparison) -> list[str]:
 
 
 def _turning(comparison: Comparison) -> list[str]:
-    """Say at which limit of the bandwidth the conclusion turns: below it, the controller alone does not do."""
+    """Say at which limit of the bandwidth the conclusion changes; below it, the controller alone is not enough."""
     needed, base = comparison.needed, comparison.results[0]
     if needed is None or base.rests:
         return []
@@ -217,7 +217,7 @@ def _turning(comparison: Comparison) -> list[str]:
 
 
 def _share_at(needed: NeededBandwidth, number: int) -> str:
-    """Write the share of machines that come to rest at one of the bandwidths."""
+    """Write the fraction of machines that come to rest at one of the bandwidths."""
     return percent(float(needed.shares[number]), 3)
 
 
@@ -273,7 +273,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
 
 
 def _as_is(comparison: Comparison) -> str:
-    """Say what the machines do as they are, unless they rest."""
+    """Say what the machines do without any option, unless they come to rest."""
     base, count = comparison.results[0], comparison.machines.count
     if base.rests:
         return ""
@@ -320,7 +320,7 @@ def _still(result: OptionResult, comparison: Comparison) -> str:
 
 
 def _failing(comparison: Comparison) -> list[str]:
-    """Say what the machines do at the end with the options that fail."""
+    """Say what the machines finally do with the options that fail."""
     return [
         f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
         f"{share_with_interval(result.settled)} are in position{_in_the_longer_run(result)}."

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
 
 SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m", "J": "j"}
-"""Suffixes of the units."""
+"""Suffixes of keys, by unit."""
 
 
 def convert_document(conversion: LawConversion) -> dict[str, Any]:

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
 
 SHOWN = 5.0
-"""How far virgin curves are drawn, in units of the deflection that static friction causes at the first stiffness."""
+"""Length of drawn virgin curves, in units of the deflection that static friction causes at the first stiffness."""
 
 DRAWN = 40
-"""Measured points that are drawn, at most."""
+"""Largest number of measured points drawn."""
 
 
 def convert_figures(conversion: LawConversion) -> list[Figure]:

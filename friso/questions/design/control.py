@@ -20,10 +20,10 @@ from friso.questions.design.words import (
 from friso.shown.drawing.prefixes import listed
 
 ROUNDED = 0.01
-"""Share by which a crossover may stay below its bound without a word: it has three digits."""
+"""Relative distance below its bound at which a crossover is not mentioned; crossovers have three digits."""
 
 LITTLE = 0.1
-"""Share by which more joint damping has to raise the modulus margin to be worth its trouble."""
+"""Least relative gain of modulus margin for which more joint damping is recommended."""
 
 
 def controller_step(design: Design) -> DesignStep:

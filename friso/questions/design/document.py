@@ -25,7 +25,7 @@ from friso.shown.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
-    """Return the whole design except its files; what an interrupted one has not decided is null."""
+    """Return the whole design except its files; what an interrupted design has not decided is null."""
     if isinstance(design, UnfinishedDesign):
         return plain_json(
             {

@@ -39,13 +39,15 @@ from friso.shown.drawing.figure import (
 from friso.shown.drawing.prefixes import listed
 
 CHOSEN = "#e3001b"
-"""The marker of what was chosen, as that of an evaluation point in maps."""
+"""Colour of the chosen design's marker, as of an evaluation point in maps."""
 
 WIDE, FEW = 30.0, 0.01
-"""Settling times more than so many times as long as the share of the shortest are drawn on a logarithmic axis."""
+"""Conditions for a logarithmic axis of settling times.
+
+It is used if the longest time exceeds `WIDE` times the quantile `FEW`."""
 
 SHARES = 401
-"""Points of a distribution."""
+"""Number of points of a distribution."""
 
 CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
 
@@ -100,7 +102,7 @@ def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
 
 
 def _map(design: Design) -> Figure:
-    """Draw over crossover and stroke in which share of the corners moves do not come to rest."""
+    """Draw over crossover and stroke in which fraction of the corners moves do not come to rest."""
     hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
@@ -177,7 +179,7 @@ def _settling(design: Design) -> Figure:
 
 
 def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
-    """Return settling times [s] and the share of moves [%] that have settled by then."""
+    """Return settling times [s] and the fraction of moves [%] that have settled by then."""
     times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:
         return np.array([1e-6]), np.array([np.nan])

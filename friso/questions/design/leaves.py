@@ -19,7 +19,7 @@ from friso.questions.flexure.words import assumptions
 from friso.shown.drawing.prefixes import listed
 
 BINDS = 0.95
-"""Share of what is required from which on a requirement is said to bind."""
+"""Fraction of a requirement's bound from which the requirement is called binding."""
 
 
 def leaves_step(design: Design) -> DesignStep:

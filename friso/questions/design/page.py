@@ -21,11 +21,11 @@ from friso.shown.files import Content, pictures
 from friso.shown.pages import Report
 
 LEAVES = 2
-"""The step that shows the drawing and the requirements."""
+"""Number of the step that shows the drawing and the requirements."""
 
 
 NOT_VERIFIED = "design-not-verified.toml"
-"""The stage file of a design that was interrupted."""
+"""Name of the stage file of an interrupted design."""
 
 
 def design_files(design: Design | UnfinishedDesign) -> dict[str, Content]:

@@ -13,7 +13,7 @@ from friso.questions.design.words import DesignStep, brings, corner, edge, gaps,
 from friso.questions.flexure.table import newtons_per
 
 GAP = 1.0
-"""Static less Coulomb friction [N] that hunting needs at least, as the thesis found (Sec. 4.3.1)."""
+"""Least difference [N] of static and Coulomb friction for hunting, as found in the thesis (Sec. 4.3.1)."""
 
 
 def steps(design: Design) -> tuple[DesignStep, ...]:

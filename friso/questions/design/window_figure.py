@@ -13,10 +13,10 @@ from friso.questions.design.words import hertz
 from friso.shown.drawing.figure import Axis, Band, Figure, Markers, Panel, Series
 
 HUNTS, CLOSE, ALLOWED = "#eba27a", "#f6ddc0", "#a5d8c4"
-"""Colours of what is forbidden, of what lacks its safety factor, and of what is allowed."""
+"""Colours of forbidden values, of values that lack their safety factor, and of allowed values."""
 
 HALF = 0.32
-"""Half the height of a bar, its row being 1 high."""
+"""Half the height of a bar, relative to the height of its row."""
 
 CHOSEN, EDGES = "#e3001b", "#7a3300"
 

@@ -8,7 +8,7 @@ from friso.interface.answer import AnswerTable
 COLUMNS = ("Symbol", "In this file", "In other units")
 
 DIGITS = 4
-"""Significant digits of gains for people; parameters of a drive have all that they need."""
+"""Significant digits of gains in sentences; parameters of a drive are written in full."""
 
 
 def title(gains: Gains) -> str:

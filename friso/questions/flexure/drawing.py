@@ -31,7 +31,7 @@ from friso.questions.flexure.svg import (
 )
 
 CLOSE = 1e-6
-"""Lengths on paper that are none [mm]."""
+"""Lengths on paper [mm] below this are treated as 0."""
 
 
 def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", material: str = "") -> str:

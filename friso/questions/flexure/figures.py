@@ -15,13 +15,13 @@ from friso.shown.drawing.figure import BLUE, GREY, ORANGE, Array, Axis, Dash, Fi
 
 COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}
-"""Closed forms are dashed, so that both are seen where they agree."""
+"""Dashes by model: closed forms are dashed, so that both models are visible where they agree."""
 
 Smooth = Callable[[Array, Array, Array], Array]
-"""From places, values there and other places to values there."""
+"""Interpolator: from places, values there, and new places to the values at the new places."""
 
 FINE = 101
-"""Deflections between which lines are drawn."""
+"""Number of deflections along a drawn line."""
 
 
 def flexure_figures(flexure: BothModels) -> tuple[Figure, ...]:

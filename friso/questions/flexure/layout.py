@@ -10,22 +10,22 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.questions.flexure.svg import SheetPoint
 
 WIDTH, ROOM = 210.0, 202.0
-"""Width of the sheet (A4 upright), and the height that the two views may take together [mm]."""
+"""Width of the sheet (A4 upright), and height available for the two views [mm]."""
 
 LEFT, RIGHT = 30.0, 50.0
-"""Beside the views, for dimensions and notes [mm]."""
+"""Margins left and right of the views, for dimensions and notes [mm]."""
 
 ABOVE, BELOW = 15.0, 15.0
-"""A view's heading and note above it, and its dimensions beneath [mm]."""
+"""Margins above a view, for heading and note, and below, for dimensions [mm]."""
 
 CLAMP, RIM, STOP = 6.0, 5.0, 4.0
-"""Clamps: their thickness and how far they reach beyond the leaves; height of a limiter stop [mm]."""
+"""Clamp thickness, overhang of a clamp beyond the leaves, and height of a limiter stop [mm]."""
 
 LEAST_LEAF, LEAST_STROKE = 0.5, 1.6
-"""Thickness of a leaf and stroke as drawn [mm] where they would be less to scale."""
+"""Least drawn thickness of a leaf, and least drawn stroke [mm]."""
 
 BEYOND = 10.0
-"""How far the block of the stage may reach beyond all else upwards and downwards before it is cut off [mm]."""
+"""Largest overhang of the stage's block above and below everything else [mm]; beyond, the block is cut off."""
 
 SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5, 2, 1))
 """Scales of ISO 5455: 5:1, 2:1, 1:1, 1:2, 1:5 and so on."""

@@ -17,25 +17,25 @@ from friso.shown.drawing.figure import BLUE, LIGHT, VERMILLION, Array, Axis, Fig
 from friso.shown.drawing.prefixes import with_unit
 
 SHOWN = 8
-"""Modes that are drawn."""
+"""Number of modes drawn."""
 
 LARGE = 0.16
-"""Amplitude of the largest motion over the size of the picture."""
+"""Amplitude of the largest motion, relative to the size of the picture."""
 
 ASPECT = 1.45
 """Width of a picture over its height."""
 
 HALF = 0.5
-"""Share of the energy from which on a mode can be drawn by what is known of it."""
+"""Fraction of a mode's energy in the known shape from which the mode is drawn."""
 
 ENOUGH = 0.9
-"""Share of all motion from which on a view shows a mode."""
+"""Fraction of all motion from which a view is considered to show a mode."""
 
 FINE = 65
-"""Places along a leaf between which lines are drawn."""
+"""Number of points along a drawn leaf."""
 
 VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 2)}
-"""The two axes of each view, the more usual ones first."""
+"""The two axes of each view, in order of preference."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
-    """Return the share of a mode's kinetic energy that its picture shows.
+    """Return the fraction of a mode's kinetic energy that its picture shows.
 
     This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
     """

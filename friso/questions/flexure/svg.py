@@ -23,10 +23,10 @@ REACH = 2.0
 """Length of the level part of the line of a note [mm]."""
 
 OVER = 1.5
-"""How far an extension line goes beyond the dimension line [mm]."""
+"""Length of an extension line beyond the dimension line [mm]."""
 
 LETTER = 0.6
-"""Width of a letter over its height, on the safe side."""
+"""Conservative ratio of a letter's width to its height."""
 
 LINES = {
     "outline": 'stroke="#222222" stroke-width="0.5"',

@@ -11,14 +11,14 @@ from friso.quantities import percent
 from friso.shown.drawing.prefixes import NOTHING, with_unit
 
 INTERFERES = "interferes"
-"""Marks a mode that disturbs control: actuator and sensor both see it."""
+"""Label of a mode that disturbs control: both actuator and sensor couple to it."""
 
 UNKNOWN = "unknown"
-"""Stands where a number of the material is not known."""
+"""Text in place of an unknown property of the material."""
 
 
 def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
-    """Return the rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
+    """Return the rows: stiffnesses, eigenfrequencies, and the loads that the leaves can bear."""
     models = list(flexure.models.values())
     above, below = (
         [(name, [text(evaluation) for evaluation in models]) for name, text in part.items()]

@@ -15,10 +15,10 @@ from friso.shown.drawing.prefixes import listed, with_unit
 from friso.stage import Stage
 
 RULE = 0.1
-"""Highest crossover over the first interfering frequency (thesis, Section 5: parasitic modes ten times higher)."""
+"""Highest crossover, relative to the first interfering frequency (thesis, Section 5)."""
 
 AGREE = 0.1
-"""Share by which the models may differ before that is said."""
+"""Relative difference of the models above which it is mentioned."""
 
 
 def sentences(flexure: BothModels) -> list[str]:

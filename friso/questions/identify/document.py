@@ -23,7 +23,7 @@ from friso.shown.documents import plain_json
 def identify_document(
     identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]
 ) -> dict[str, Any]:
-    """Return the JSON document of an identification, but for the files written.
+    """Return the JSON document of an identification, without the files written.
 
     It has the conclusion, the logs, the experiments with their numbers, all estimates, and predictions of other logs.
     """

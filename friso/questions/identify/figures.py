@@ -26,7 +26,7 @@ SHORT = {
     "joint.stiffness": "joint k",
     "joint.damping": "joint d",
 }
-"""Keys of the stage file in the room that there is beside an axis."""
+"""Short names of keys for the limited room beside an axis."""
 
 
 def identify_figures(identification: Identification, predictions: Sequence[Prediction]) -> list[Figure]:
@@ -40,7 +40,7 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
 
 
 def _intervals(identification: Identification) -> list[Figure]:
-    """Draw how well every key is known: half its interval over the middle of it."""
+    """Draw the half-width of every key's interval, relative to its centre."""
     bounded = [
         estimate
         for estimate in ordered(identification.estimates)

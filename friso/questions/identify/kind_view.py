@@ -18,7 +18,7 @@ from friso.registry import Registry
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 
 Facts = tuple[tuple[str, str], ...]
-"""Numbers in words, by name."""
+"""Values in words, with their names."""
 
 Result = TypeVar("Result")
 
@@ -66,7 +66,7 @@ class KindView(Generic[Result]):
 
 
 VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIEW")
-"""Every module of `friso/questions/identify/kinds/` declares one, under the name of its kind of experiment."""
+"""Views by kind of experiment: one from every module of `friso/questions/identify/kinds/`."""
 
 
 def view_of(kind: str) -> KindView[Any]:

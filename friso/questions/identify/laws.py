@@ -83,7 +83,7 @@ def laws_document(comparison: LawComparison) -> dict[str, Any]:
 
 
 def _error_share(prediction: LawPrediction) -> str:
-    """Write the error of a law as a share of the friction's deviation."""
+    """Write the error of a law as a fraction of the friction's deviation."""
     return percent(prediction.error)
 
 

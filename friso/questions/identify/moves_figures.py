@@ -36,10 +36,10 @@ FORCE = "force"
 """Name of the figure that opens the page."""
 
 WORST = 5.0
-"""How much worse a fit is seen in a profile, in units of what ends the 95 % interval."""
+"""Upper end of the axis of a profile, in units of the misfit at the ends of the 95 % interval."""
 
 WIDE = 8.0
-"""Ratio of the ends from which a profile has a logarithmic axis."""
+"""Ratio of its ends above which a profile has a logarithmic axis."""
 
 LONG = 40.0
 """Length of the force record at the head of the page, in periods of the motion's bandwidth."""
@@ -71,7 +71,7 @@ def _force(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _liveliest(moves: IdentifiedMoves) -> slice:
-    """Return the samples of the stretch of a log, a few periods long, that goes the longest way."""
+    """Return the samples of the stretch of a log with the most motion, a few periods long."""
     position = moves.log["position"][moves.part]
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
     length = min(len(position), max(2, round(LONG / (moves.inverse.bandwidth * moves.log.sample_time))))
@@ -115,7 +115,7 @@ def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Se
 
 
 def _difference(time: Array, left: Array, unit: str) -> Panel:
-    """Draw what is left of a signal over time."""
+    """Draw the residual of a signal over time."""
     return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
@@ -140,7 +140,7 @@ def _residual(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _friction(moves: IdentifiedMoves, name: str) -> Figure:
-    """Draw the force less inertia over velocity, and the friction that was identified."""
+    """Draw the force without the inertial force over velocity, and the identified friction."""
     settings = IdentificationSettings.current()
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
@@ -178,7 +178,7 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """Draw how much worse the fit gets as one parameter is moved."""
+    """Draw how much worse the fit becomes as one parameter is varied."""
     best = moves.fit.cost
     parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
@@ -199,7 +199,7 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
-    """Draw the panel of one parameter."""
+    """Draw the profile of one parameter."""
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))

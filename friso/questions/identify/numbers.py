@@ -12,19 +12,19 @@ from friso.questions.map.words import quantity
 from friso.shown.drawing.prefixes import NOTHING, choose, pretty
 
 DIGITS = 2
-"""Significant digits of half an interval that are shown, and so of its value."""
+"""Significant digits of the half-width of an interval, which also set those of the value."""
 
 MOST = 4
-"""Significant digits of a number without interval."""
+"""Largest number of significant digits of a value without interval."""
 
 LARGE, SMALL = 4, 7
-"""Zeros before, and places behind the decimal point, from which on a number has an exponent."""
+"""Zeros before and decimals behind the point above which a number gets an exponent."""
 
 EXACT = 15
-"""Digits behind the first one that a number has at all."""
+"""Largest number of digits after the first one."""
 
 FORCES = (1e-2, 1e4)
-"""Between these, forces [N], and what is in newtons per something, have no prefix: they are compared with others."""
+"""Range of forces [N], and of quantities per newton, without an SI prefix; they are compared with each other."""
 
 _NAMES = {
     "bias.cart": "Constant force on the cart",
@@ -46,7 +46,7 @@ def name_of(key: str) -> str:
 
 
 def within(key: str) -> str:
-    """Write the name of a key inside a sentence: names of people stay as they are."""
+    """Write the name of a key inside a sentence; proper names keep their capitals."""
     name = name_of(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
@@ -63,7 +63,7 @@ def unit_of(unit: str) -> str:
 
 
 def value_text(estimate: Estimate) -> str:
-    """Write a value with its unit, e.g. "95.28 kg"; a dash where there is none."""
+    """Write a value with its unit, such as "95.28 kg"; a dash without a value."""
     if not math.isfinite(estimate.value):
         return NOTHING
     factor, unit = _scale(estimate)
@@ -71,7 +71,7 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Write an interval, e.g. "94.84 to 95.72 kg".
+    """Write an interval, such as "94.84 to 95.72 kg".
 
     For a value that the logs do not show, it is the range that they allow.
     """
@@ -102,7 +102,7 @@ def estimates_in_words(estimates: Sequence[Estimate]) -> str:
 
 
 def digits(value: float, unit: str) -> str:
-    """Write a value [unit] to three digits, with a prefix of its own: "2.1 µm"."""
+    """Write a value [unit] to three digits with a suitable prefix: "2.1 µm"."""
     if not math.isfinite(value):
         return NOTHING
     factor, text = choose(np.array([value]), unit)
@@ -137,7 +137,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 
 def _written(value: float, factor: float, places: int) -> str:
-    """Write a number with so many decimal places."""
+    """Write a number with a given number of decimal places."""
     if math.isfinite(value) and not -LARGE <= places <= SMALL:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
         return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"

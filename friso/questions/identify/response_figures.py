@@ -89,7 +89,7 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
 
 
 def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
-    """Return phases of a fit [deg] in the turn in which the measured ones are."""
+    """Return phases of a fit [deg], shifted by whole turns to the measured phases."""
     off = np.interp(fine, hertz, measured) - fitted
     return fitted + 360 * np.round(np.median(off) / 360)
 
@@ -118,7 +118,7 @@ def _around(*several: Array) -> tuple[float, float]:
 
 
 def _levels(bench: Bench, name: str) -> list[Figure]:
-    """Draw response, noise and distortion, where the record shows these."""
+    """Draw response, noise and distortion, where the record shows them."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     panels = tuple(_level_panel(response) for response in outputs)
     if min(len(panel.series) for panel in panels) < 2:
@@ -146,7 +146,7 @@ def _level_panel(response: FrequencyResponse) -> Panel:
 
 
 def _departure(bench: Bench, name: str) -> Figure:
-    """Draw the response over the model, and where it leaves it."""
+    """Draw the ratio of measured to modelled response, and where it departs from 1."""
     departs = bench.departs
     assert departs is not None
     limits = _around(departs.excess)

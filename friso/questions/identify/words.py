@@ -1,4 +1,4 @@
-"""An identification in words that the terminal and the page share."""
+"""Write an identification in words for the terminal and the page."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
 """Columns of the table of estimates."""
 
 LEFT = "not identified"
-"""Stands for the value of what the logs do not show."""
+"""Text in place of a value that the logs do not show."""
 
 NO_STAGE = (
     "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
@@ -44,7 +44,7 @@ NO_NEWTONS = "No stage file is written: its keys need the force in {}."
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
 
 POOR = 0.5
-"""Relative error of the force, or of a response, from which on little of another log is predicted."""
+"""Relative error of force or response above which the prediction of another log is called poor."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _headline(identification: Identification) -> list[tuple[str, str]]:
-    """Say what is identified, before doubts are put first or last."""
+    """Say what is identified, before doubts are added."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not _absent(estimate)]
@@ -108,7 +108,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _why_no_stage(identification: Identification) -> str:
-    """Say why there is no stage."""
+    """Say why no stage file is written."""
     if identification.failed or nothing_learnt(identification.estimates, False):
         return NOTHING_HOLDS
     shown = axis_shown()
@@ -121,18 +121,18 @@ def _why_no_stage(identification: Identification) -> str:
 
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
-"""Keys that are usually 0: an interval that holds that shows no such effect."""
+"""Keys that are usually 0; an interval that contains 0 shows no effect."""
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate says that something is not there: its interval holds 0."""
+    """Tell whether an estimate shows no effect: its interval contains 0."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show what is not identified.
 
-    A kind that was `done` is left out: what those logs lacked is in the reasons.
+    A kind that was `done` is left out; the reasons say what its logs lacked.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
@@ -143,7 +143,7 @@ def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
 
 
 def missing(estimates: Sequence[Estimate]) -> str:
-    """Say what is not identified, with its reason, which several may share."""
+    """Say what is not identified; keys with one reason are listed together."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         if not estimate.determined:
@@ -152,7 +152,7 @@ def missing(estimates: Sequence[Estimate]) -> str:
 
 
 def prediction_view(prediction: Prediction) -> PredictionView[Any]:
-    """Return how the kind of experiment that predicts shows a prediction."""
+    """Return the view of a prediction, as declared by the kind of experiment that predicts."""
     view = view_of(prediction.kind).prediction
     assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
     return view
@@ -185,7 +185,7 @@ def _row(estimate: Estimate) -> EstimateRow:
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
-    """Return the experiments, in words."""
+    """Return the experiments in words."""
     several = zip(identification.experiments, labels(identification), strict=True)
     experiments = [_summary(experiment, label) for experiment, label in several]
     laws = identification.laws
@@ -225,7 +225,7 @@ def _used(logs: Sequence[Source]) -> Facts:
 def labels(identification: Identification) -> list[str]:
     """Return a name for every experiment, from which its figures are named.
 
-    It is the kind, with a number if several experiments are of this kind.
+    It is the kind, with a number if several experiments are of one kind.
     """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [
@@ -283,7 +283,7 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
-    """Align quantity, value and interval in columns; the reason where there is no value."""
+    """Align quantity, value and interval in columns; a missing value is replaced by the reason."""
     table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

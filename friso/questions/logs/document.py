@@ -11,7 +11,7 @@ from friso.shown.documents import plain_json
 
 
 def logs_document(contents: Sequence[LogContent]) -> dict[str, Any]:
-    """Return the JSON document of all files, but for those that are written."""
+    """Return the JSON document of all files that were read, without those written."""
     return plain_json({"logs": [_log(content) for content in contents]})
 
 

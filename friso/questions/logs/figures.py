@@ -12,7 +12,7 @@ from friso.questions.logs.words import title
 from friso.shown.drawing.figure import BLUE, Axis, Figure, Panel, Series
 
 MOST = 12
-"""Channels of a file that are drawn."""
+"""Largest number of channels of a file that are drawn."""
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
@@ -21,7 +21,7 @@ def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
 
 
 def _figure(content: LogContent, number: int) -> Figure:
-    """Draw the channels of a file."""
+    """Draw the channels of one file."""
     channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
     left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
     caption = f"As they stand in the file, in its own units.{left}"

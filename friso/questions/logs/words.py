@@ -17,7 +17,7 @@ COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""
 
 PLAIN = 1e7
-"""Numbers below this one stand without an exponent."""
+"""Numbers below this are written without an exponent."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 
@@ -57,7 +57,7 @@ def conclusions(content: LogContent) -> list[tuple[str, str]]:
 
 
 def open_questions(content: LogContent) -> list[str]:
-    """Say what has to be told, each in a sentence with the option that tells it."""
+    """Say what the user must state, each in a sentence with its option."""
     return [
         f"{gap.key}: {gap.expected}; given: {gap.actual}" + (f"; for example {gap.example}" if gap.example else "")
         for gap in content.gaps
@@ -95,7 +95,7 @@ def _range(channel: ChannelContent) -> str:
 
 
 def _number(value: float) -> str:
-    """Write four digits, without an exponent where a plain number is as short to read."""
+    """Write four digits, without an exponent where a plain number is as short."""
     text = f"{value:.4g}"
     return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
 
@@ -120,7 +120,7 @@ def sparkline(values: np.ndarray) -> str:
 
 
 def _holds(content: LogContent) -> str:
-    """Say what the file holds."""
+    """Say what a file holds."""
     if content.response is not None:
         frequency = content.response.frequency
         ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")

@@ -109,10 +109,10 @@ class _Cells:
 
 
 FINEST = 2 * min(BANDS)
-"""The least range [m] over which a run is drawn."""
+"""Least range [m] of the axis of a drawn run."""
 
 HIGHEST = 250
-"""The largest of the bytes that stand for the heights of a drawn run; 255 stands for none."""
+"""Largest byte that encodes a height of a drawn run; 255 encodes a missing height."""
 
 
 def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Say what share of a map swings or hunts and where, and how far that can be trusted."""
+"""Say in which part of a map the stage swings or hunts, where that is, and how far it can be trusted."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _QUIET = ("transient", "settles")
 
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return the first statement of a map: where, and in which share of it, its finding holds.
+    """Return the first statement of a map: where, and in which fraction of it, its finding holds.
 
     The finding is what the metric is asked for (`Metric.findings`). Doubts follow. It is empty if the runs have no
     outcome.
@@ -61,7 +61,7 @@ def headline(runs: xr.Dataset, name: str) -> str:
 
 
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
-    """Return in what share of the map a finding holds, and where."""
+    """Return the fraction of the map in which a finding holds, and where."""
     holds, completed = _flags(runs, name, finding.words)
     if not completed.any():
         return "No cell of the map has a result."
@@ -127,7 +127,7 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
 
 
 def _percent(part: int, total: int) -> str:
-    """Write a share; only an exact one is shown as 0 or 100 %."""
+    """Write a fraction; only an exact one is shown as 0 or 100 %."""
     share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"
@@ -173,7 +173,7 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
-    """Say where counts, if a map shows them, say something else than the end of the run."""
+    """Say where counts on a map disagree with the end of the run."""
     if name not in metrics() or not metrics()[name].counts or not {name, "outcome"} <= set(runs.data_vars):
         return []
     counted, outcome = runs[name].values, runs["outcome"].values
@@ -200,7 +200,7 @@ def _extent(runs: xr.Dataset) -> str:
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """Return all sentences for the terminal.
 
-    An unstable loop comes first, then the share of the map that swings or hunts.
+    An unstable loop comes first, then the fraction of the map that swings or hunts.
     """
     words = "; ".join(filter(None, (tally(runs, name) for name in tallied())))
     size = " x ".join(map(str, study.shape))

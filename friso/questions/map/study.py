@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
 DRAWN = 4096
-"""Cells up to which a page holds the run of each of them."""
+"""Largest number of cells for which a page includes every run."""
 
 BYTES = 8
-"""Bytes of a number in a store, before they are compressed."""
+"""Bytes per number in a store before compression."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ def write_beside(
 
 
 PATIENCE = 10.0
-"""How long [s] another process is waited for that is noting something in a store."""
+"""Time [s] to wait for another process that is writing a note into a store."""
 
 
 def _views(store: Path) -> list[Path]:
@@ -299,7 +299,7 @@ def _digest(file: Path) -> str | None:
 
 
 _MOST_OF_A_FILE = 1 << 30
-"""Bytes of a figure, a page or an export at most that is known again."""
+"""Largest size in bytes of a figure, page or export that is compared with an earlier one."""
 
 
 def path_beside(store: Path, form: str) -> Path:

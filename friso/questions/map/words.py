@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AT_ONCE = 1_000_000
-"""Texts that are counted at a time."""
+"""Number of texts counted in one batch."""
 
 _QUANTITIES = {
     FORCE_LIMIT: "Force limit",
@@ -36,7 +36,7 @@ NOT_RUN = Category("not run", "#ffffff")
 _NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
 _NO_NUMBER = "#e8dcc6"
 PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "quiet": QUIET}
-"""Colours of words that metrics name; they may give others as "#rrggbb"."""
+"""Colours by the words that metrics use; metrics may also give "#rrggbb"."""
 
 
 def quantity(key: Hashable) -> str:

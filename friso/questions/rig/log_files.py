@@ -15,7 +15,7 @@ from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog
 
 UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "m/s"}
-"""Units of the signals that are no lengths."""
+"""Units of the signals that are not lengths."""
 
 
 def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:

@@ -29,8 +29,9 @@ class OutcomeView:
 
 
 OUTCOME_VIEWS = Registry[OutcomeView]("friso.questions.rig.experiments", "VIEW", "friso.rig_views", OutcomeView)
-"""Every module of `friso/questions/rig/experiments/` declares one, and every module that an installed package names,
-under the name of its experiment."""
+"""Views by experiment.
+
+Every module of `friso/questions/rig/experiments/` declares one, and so does every module of an installed package."""
 
 
 def view_of(experiment: str) -> OutcomeView:

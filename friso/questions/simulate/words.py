@@ -13,7 +13,7 @@ from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
 
 GROWN = 1.1
-"""How many times as far as before a run is off its reference in its last quarter that goes ever farther."""
+"""Ratio of errors in the last quarter of a run and before it, above which the run counts as diverging."""
 
 
 def conclusion(

@@ -74,7 +74,7 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
 
 
 def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
-    """Return shares, settling times, force and margin of machines."""
+    """Return fractions, settling times, force and margin of machines."""
     goal = tuning.goal
     return {
         "moves_m": measured.held_moves(goal),

@@ -36,16 +36,16 @@ from friso.stage.controllers import CONTROLLER
 from friso.studies.compare.options import linear_flat
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Colours of remedies that have settings, in order; further ones begin again, dashed."""
+"""Colours of remedies with settings, in order; further remedies repeat them, dashed."""
 
 SAMPLES = 4000
-"""Samples of a time response."""
+"""Number of samples of a time response."""
 
 SHOWN = 3.0
-"""The responses are drawn for so many times as long as the slowest twentieth of machines takes with what works."""
+"""Duration of drawn responses, relative to the settling time that 95 % of machines reach with a working remedy."""
 
 RTOL = 1e-7
-"""Relative tolerance of the responses that are drawn."""
+"""Relative tolerance of drawn responses."""
 
 
 def tune_figures(tuning: Advice) -> list[Figure]:
@@ -134,7 +134,7 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _settling(tuning: Advice, lines: Lines) -> Panel:
-    """Return the panel of the share of machines in position over the time since the move."""
+    """Return the panel of the fraction of machines in position over the time since the move."""
     flat = tuning.stage.flat()
     drawn = [(outcome.measured if outcome else tuning.present, line) for _, outcome, line in lines]
     longest = max(

@@ -18,10 +18,10 @@ from friso.stage import Stage
 from friso.stage.correlations import correlations_file, correlations_text
 
 NOT_SURE, LARGE_MOVES = "-not-sure", "-for-large-moves"
-"""Ends of the names of stage files with remedies that are not sure to work, or that work for large moves alone."""
+"""Suffixes of stage files whose remedies are not sure to work, or work for large moves only."""
 
 OF_LEAVES = "-of-leaf-springs"
-"""End of the names of stage files with joints made of leaf springs."""
+"""Suffix of stage files with joints made of leaf springs."""
 
 
 def tune_files(tuning: Advice) -> dict[str, Content]:

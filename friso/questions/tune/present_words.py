@@ -37,7 +37,7 @@ def as_it_is(tuning: Advice) -> str:
 
 
 def _missed(name: str, tuning: Advice) -> str:
-    """Say that the stage misses a part of the goal, with the share of machines and moves if these tell it."""
+    """Say that the stage misses a part of the goal, with the fraction of machines and moves if these tell it."""
     present, goal = tuning.present, tuning.goal
     meets = present.meets(goal)
     every = np.all([*meets.values()], axis=0)

@@ -8,7 +8,7 @@ from friso.remedies.sensitivities import Sensitivities
 from friso.shown.drawing.prefixes import with_unit
 
 MOST, LEAST = 4, 0.02
-"""Keys that are named at most, and how much of what the first one does they have to do at least."""
+"""Largest number of keys named, and least effect of a named key relative to the strongest."""
 
 
 def sensitivity_sentences(tuning: Advice) -> list[str]:

@@ -70,7 +70,7 @@ OPTIONS = {
 ABSENT = "never"
 
 NONE_FOUND = "none was found that surely works"
-"""Said of a remedy whose settings meet the goal on the machines of the search, but not surely on others."""
+"""Sentence on a remedy whose settings meet the goal for the machines of the search, but not surely for others."""
 
 LOCKED = "joint.locked"
 
@@ -616,7 +616,7 @@ def window_facts(tuning: Advice) -> list[tuple[str, str]]:
 
 
 def _windows(outcome: RemedyOutcome) -> list[str]:
-    """Write the windows of a remedy's numbers."""
+    """Write the ranges in which a remedy's numbers work, each varied alone."""
     return [window_words(window, outcome) for window in outcome.windows]
 
 

@@ -21,7 +21,7 @@ Field = TypeVar("Field", bound=Coloured)
 
 
 LONGEST_TEXT = 1000
-"""Characters of a text in a figure at most: the longest caption has half of them."""
+"""Longest text in a figure in characters; the longest caption has half of them."""
 
 
 def drawable(figure: Figure) -> Figure:
@@ -91,7 +91,7 @@ def line_key(figure: Figure) -> list[Series]:
 
 
 WORDS = 12
-"""Words at an axis at most."""
+"""Largest number of words at an axis."""
 
 
 def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:

@@ -203,7 +203,7 @@ class _Head:
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
-        """Return the legend as plotly takes it, above axes at a place in shares of the figure.
+        """Return the legend as plotly takes it, above axes at a place in fractions of the figure.
 
         The title stands above the entries, which take fewer rows if there is more room.
         """
@@ -214,7 +214,7 @@ class _Head:
     def alone(self, left: float, top: float) -> dict[str, Any]:
         """Return the title as plotly takes it without a legend.
 
-        It stands above axes at a place in shares of the figure.
+        It stands above axes at a place in fractions of the figure.
         """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
         return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}

@@ -1,1 +1,1 @@
-"""Isolator or firmware: the same drawn machines settled by a joint, and by settings of the controller."""
+"""Compare a joint with settings of the controller on the same random machines."""

@@ -1,4 +1,4 @@
-"""The machine with active disturbance rejection in place of its controller, and the numbers of that."""
+"""Replace a machine's controller by active disturbance rejection, and compute its numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from friso.stage.controllers import CONTROLLER, KIND
 from friso.stage.transmission import moving_mass
 
 ADRC = "adrc"
-"""The name by which it is asked for, and the kind of the controller."""
+"""Name of the option, and kind of the controller."""
 
 
 class Rejection(NamedTuple):
@@ -24,11 +24,10 @@ class Rejection(NamedTuple):
 
 
 def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
-    """Return the stage with active disturbance rejection as fast as its controller is now.
+    """Return the stage with active disturbance rejection as fast as its present controller.
 
-    The loop of the sliding machine crosses 0 dB at the first of the present `crossovers` [Hz], `crossings`, for the
-    mass believed now. Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too
-    slow.
+    The loop of the sliding machine, with its assumed mass, crosses 0 dB at the first of the present `crossings` [Hz].
+    Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too slow.
     """
     if not crossings:
         raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
@@ -48,5 +47,5 @@ def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
 
 
 def rejection(flat: Mapping[str, Any]) -> Rejection | None:
-    """Return the numbers of a disturbance-rejecting controller; None for another controller."""
+    """Return the numbers of a disturbance-rejecting controller, None for other controllers."""
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None

@@ -1,4 +1,4 @@
-"""Machines drawn around a stage file: the same numbers, rails and noise for every option."""
+"""Draw machines around a stage file, with equal numbers, rails and noise for every option."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.stage.lists import element_keys
 from friso.virtual_rig.task import SAMPLE_TIME
 
 LEAST, MOST = 20, 100_000
-"""Machines at least, for an interval to tell anything, and at most, which take hours."""
+"""Fewest machines, for a useful interval, and most, which take hours."""
 
 
 SPREADS: Mapping[str, float] = MappingProxyType(
@@ -42,44 +42,45 @@ SPREADS: Mapping[str, float] = MappingProxyType(
         "rail.coulomb_deviation": 30.0,
     }
 )
-"""Half-widths of the 95 % intervals [%] of keys for which the stage file gives none. They are our choice: friction as
-it differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as badly known as
-they are identified."""
+"""Half-widths of the 95 % intervals [%] of keys for which the stage file has none, chosen by friso: friction as it
+differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as uncertain as
+identification leaves them."""
 
 ELEMENTS: Mapping[str, float] = MappingProxyType({"friction.element_stiffness": 50.0, "friction.element_damping": 50.0})
-"""Half-widths of the 95 % intervals [%] of arrays for which the stage file gives none. All elements of an array vary by
+"""Half-widths of the 95 % intervals [%] of arrays for which the stage file has none. All elements of an array vary by
 one common factor."""
 
 SLIP = "friction.breakaway_deflection"
-"""Deflection at which elasto-plastic bristles begin to slip. It is drawn as a share of that of sliding, F_c/sigma_0, at
-which it has to stay below: what varies by its spread is that share over what is left of it."""
+"""Key of the deflection at which elasto-plastic bristles begin to slip. It is drawn as a fraction of that of sliding,
+F_c/sigma_0, which it must not reach: the spread applies to this fraction over one minus it."""
 
 TINY = 1e-6
-"""Factor on this deflection while the other keys are drawn, so that it rules out none of them."""
+"""Factor on this deflection while the other keys are drawn, so that it excludes none of them."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
-"""Keys that follow the preload together, and their correlation, where neither is uncertain in the file: our choice."""
+"""Keys that both follow the preload, and their correlation if neither is uncertain in the file (friso's choice)."""
 
 HELD = (
     *(f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.velocity_sample_time", "drive.position_sample_time"),
     *("drive.delay", "drive.velocity_samples"),
 )
-"""Keys that are set, not identified: equal on all machines, even where the file calls them uncertain."""
+"""Prefixes of keys that are set rather than identified: equal on all machines, even if the file calls them uncertain.
+"""
 
 SIGNS = int.from_bytes(b"signs")
-"""Which of a seed's random numbers: Philox takes them as the second half of its key."""
+"""Second half of Philox's key for the signs of model errors."""
 
 FROM_LEAVES = ("joint.stiffness", "parasitic.")
-"""Keys that follow from leaf springs, where the stage has these."""
+"""Prefixes of keys that follow from leaf springs, if the stage has any."""
 
 
 @dataclass(frozen=True)
 class Machines:
     """Machines drawn around a stage whose drive states a sample time.
 
-    `keys` that differ are SI arrays of shape (count,). There are the seeds of their noise, and the sign, 1 or -1, of
-    the error of each machine's model. `drawn` and `spreads` [%] say from which keys of the file and from which default
-    spreads they were drawn; notes say what to know of that.
+    `keys` that differ are SI arrays of shape (count,). Further fields are the seeds of noise, and the sign, 1 or -1, of
+    the error of each machine's model. `drawn` and `spreads` [%] tell from which keys of the file and which default
+    spreads they were drawn; notes are for the reader.
     """
 
     stage: Stage
@@ -97,9 +98,9 @@ class Machines:
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return keys of all machines under an option, with its stage and changes.
+        """Return the keys of all machines under an option, with its stage and changes.
 
-        The controller is tuned as it is and does not know the masses that were drawn.
+        The controller is tuned for the stage, not for the drawn masses.
         """
         return stage.flat(self.changes(stage, changes))
 
@@ -109,9 +110,9 @@ class Machines:
 
 
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
-    """Machines drawn from what is uncertain of the stage, and by default spreads from the rest.
+    """Draw machines from the uncertain keys of a stage, and from default spreads of others.
 
-    Raises InputError for a number of machines or a seed that is not allowed, and for ranges hardly any of which is.
+    Raises InputError for an invalid number of machines or seed, and for ranges of which hardly any machine is valid.
     """
     for option, value, least, most in (("--machines", count, LEAST, MOST), ("--seed", seed, 0, MOST_SEED)):
         if not least <= value <= most:
@@ -151,7 +152,7 @@ def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
 
 
 def _spreads(stage: Stage) -> dict[str, float]:
-    """Default spreads [%] of keys that the stage has, not 0, and calls certain."""
+    """Return default spreads [%] of keys of the stage that are not 0 and not uncertain."""
     flat, uncertain = stage.flat(), stage.uncertain()
     follow = FROM_LEAVES if stage.flexure else ()
     single = {key: spread for key, spread in SPREADS.items() if key not in uncertain and not key.startswith(follow)}
@@ -177,7 +178,7 @@ def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.nda
 
 
 def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
-    """Return the stage with these spreads [%] written into it."""
+    """Return the stage with given spreads [%]."""
     flat = stage.flat()
     if SLIP in spreads:
         flat[SLIP] *= TINY
@@ -188,7 +189,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 
 def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
-    """Return the correlations given, and default ones for the keys with default spreads."""
+    """Return the given correlations, and default ones for the keys with default spreads."""
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
     groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]

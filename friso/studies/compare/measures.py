@@ -20,11 +20,11 @@ from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 
 DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
-"""Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of
-the slowest pole; the highest is half that of sampling, or so many times the fastest pole."""
+"""Frequencies per decade at which loops are evaluated, besides those near resonances; the lowest, over the slowest
+pole; the highest, over the fastest pole, or half the sampling frequency."""
 
 CLOSER, WITHIN = 2, 9
-"""How often a loop is looked at more closely about the frequency where it comes closest to -1, and at how many."""
+"""Refinements about the frequency at which a loop comes closest to -1, and frequencies of each."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ AnyMeasures = TypeVar("AnyMeasures", "MachineMeasures", "Later")
 
 
 def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
-    """Chunks of runs, one after the other."""
+    """Join the measures of chunks of runs."""
     names = [field.name for field in fields(parts[0])]
     return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -73,7 +73,8 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
     """Measure a chunk of runs whose reference comes to stand at `stands`.
 
-    In position means `within` [m]. What the drive logs counts for peaks, the true motion for everything else.
+    The tolerance for in position is `within` [m]. Peaks are those in the drive's log, all else those of the true
+    motion.
     """
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
@@ -92,10 +93,9 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 
 @dataclass(frozen=True)
 class Later:
-    """Runs that were followed for longer, arrays of shape (some,).
+    """Runs that were continued, arrays of shape (some,).
 
-    `done` tells whether they were completed, `stays` whether the stage is in position throughout the last half (it
-    rests, and has done so for that long).
+    `done` tells whether they were completed, `stays` whether the stage is in position throughout the last half.
     """
 
     done: np.ndarray
@@ -104,7 +104,7 @@ class Later:
 
 @np.errstate(all="ignore")
 def staying_in_position(recorded: RecordedRuns, within: float) -> Later:
-    """For the runs of a chunk, whether they stay in position, `within` [m]."""
+    """Return whether the runs of a chunk stay in position, `within` [m]."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE
     words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)

@@ -1,4 +1,4 @@
-"""Find the bandwidth from which on a controller alone brings drawn machines to rest."""
+"""Find the bandwidth from which on a controller alone brings random machines to rest."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Shares of machines that come to rest by the controller alone, over its bandwidth, (n,).
+    """Fractions of machines that come to rest by the controller alone, over its bandwidth, (n,).
 
     The bandwidths [Hz] are those at which the open loop last crosses 0 dB, from the present one to the highest with
     enough margin. The joint is locked, and the controller in continuous time.
@@ -34,7 +34,10 @@ class NeededBandwidth:
     shares: np.ndarray
 
     def turning(self, enough: float) -> int | None:
-        """Return the index of the bandwidth from which on `enough` machines come to rest, or None."""
+        """Return the index of the bandwidth from which on enough machines come to rest, or None.
+
+        `enough` is their fraction.
+        """
         missed = np.flatnonzero(self.shares < enough)
         first = int(missed[-1]) + 1 if missed.size else 0
         return first if first < len(self.shares) else None

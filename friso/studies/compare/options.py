@@ -1,4 +1,4 @@
-"""The ways to settle a machine: settings of its controller, a joint, or both."""
+"""Define the options to settle a machine: settings of its controller, a joint, or both."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from friso.studies.compare.machines import Machines
 from friso.studies.settings import StudySettings
 
 DEADBAND = 0.5
-"""Deadband of the integrator, in tolerances for being in position: our choice. It rests while the stage is in position,
-and the edge of the band is not that of the tolerance."""
+"""Deadband of the integrator over the tolerance for in position (friso's choice). The integrator pauses while the stage
+is in position, and the edge of the band differs from the tolerance."""
 
 MODEL_ERROR = 0.2
-"""Share by which the friction in the feedforward is off, Coulomb and viscous of a machine in the same direction."""
+"""Relative error of the friction in the feedforward, with one sign for Coulomb and viscous friction of a machine."""
 
 PER_PERIOD = 10
-"""Samples that a period of the crossover has at least, as the stage file demands."""
+"""Fewest samples in a period of the crossover, as the stage file demands."""
 
 
 class UnavailableError(Exception):
-    """An option that the machines cannot have, and why."""
+    """Error: the machines cannot have an option, with the reason."""
 
 
 @dataclass(frozen=True)
 class Situation:
-    """The machines that are to be settled, and the tolerance `within` [m] for being in position.
+    """The machines to be settled, and the tolerance `within` [m] for in position.
 
     The bandwidth of a faster controller must not exceed `bandwidth_limit` [Hz]; None means that only margins limit it.
     """
@@ -52,7 +52,7 @@ class Situation:
 
     @property
     def locked(self) -> Stage:
-        """Return the stage with its joint locked; as it is if it has none."""
+        """Return the stage with its joint locked, or unchanged without a joint."""
         return self.machines.stage.variants().get("locked", self.machines.stage)
 
     @property
@@ -76,15 +76,15 @@ class Situation:
 
     @property
     def deadband(self) -> float:
-        """Deadband of the integrator [m]."""
+        """Return the deadband of the integrator [m]."""
         return DEADBAND * self.within
 
 
 class Variant(NamedTuple):
     """A stage of one option.
 
-    It has the keys that differ from machine to machine (numbers, or arrays with one for each machine), and the factor
-    by which its controller is faster.
+    It has the keys that differ between machines (numbers, or arrays with one value for each machine), and the factor by
+    which its controller is faster.
     """
 
     stage: Stage
@@ -150,7 +150,7 @@ class Option:
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """The options that the machines can have.
+    """Options that the machines can have.
 
     `left_out` gives the reason for others, by letter; the deadband of the integrator is in [m].
     """
@@ -180,7 +180,7 @@ def options(
 ) -> CompareOptions:
     """Return the options of machines that are to be in position `within` a tolerance [m].
 
-    Those named `also`, or "all", join the usual ones. No faster controller exceeds the `bandwidth_limit` [Hz].
+    Options in `also`, or "all", join the usual ones. No faster controller exceeds the `bandwidth_limit` [Hz].
     """
     situation = Situation(machines, within, bandwidth_limit)
     tried: list[Option] = []
@@ -198,8 +198,8 @@ def options(
 def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the file's machine keeps its margin.
 
-    It lies below the limit of the bandwidth. An engineer tunes one machine, and all others get its settings. Raises
-    UnavailableError if it is that fast already.
+    The bandwidth is below its limit. An engineer tunes one machine, and all others get its settings. Raises
+    UnavailableError if the present bandwidth is that high already.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -239,13 +239,13 @@ def _feedforward(situation: Situation) -> Variant:
 
 
 def _with_setting(setting: Setting, situation: Situation) -> Variant:
-    """Return the locked stage with one size of a setting against friction."""
+    """Return the locked stage with a setting against friction, at one size."""
     stage = situation.integrating if setting.integral else situation.locked
     return Variant(stage.with_numbers(setting.numbers(stage.flat(), situation.within)))
 
 
 def _rejecting(situation: Situation) -> Variant:
-    """Return the locked stage with active disturbance rejection, as fast as it is now."""
+    """Return the locked stage with active disturbance rejection of the present speed."""
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
     try:
@@ -346,4 +346,4 @@ OPTIONS: Mapping[str, OptionKind] = {kind.name: kind for kind in _OPTIONS}
 """All options, by name, in the order of their letters."""
 
 ALSO = (*SETTINGS, ADRC)
-"""Options that are tried where they are asked for."""
+"""Options that run only on request."""

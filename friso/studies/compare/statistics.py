@@ -12,7 +12,7 @@ from friso.intervals import COVERAGE
 
 @dataclass(frozen=True)
 class EstimatedValue:
-    """A value and its 95 % interval; NaN where nothing is known."""
+    """A value and its 95 % interval; NaN if unknown."""
 
     value: float
     low: float
@@ -39,15 +39,15 @@ def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
 
 
 def _middle(ordered: np.ndarray) -> float:
-    """Return the median of ordered values, also of infinite ones."""
+    """Return the median of ordered values, which may be infinite."""
     low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
     return float(low if low == high else (low + high) / 2)
 
 
 def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
-    """Return how much more probable something is than before, on the same machines.
+    """Return the increase in the probability of an event on paired machines.
 
-    Agresti, Min 2005, doi:10.1002/sim.1781: the interval of Wald, with half a machine added to every cell.
+    Agresti, Min 2005, doi:10.1002/sim.1781: Wald's interval, with half a machine added to every cell.
     """
     count = len(flags)
     if not count:

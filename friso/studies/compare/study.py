@@ -1,4 +1,4 @@
-"""The comparison: every option on every machine, all runs of an option in one call."""
+"""Compare options: run every option on every machine, all machines of an option at once."""
 
 from __future__ import annotations
 
@@ -33,19 +33,21 @@ from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
 
 INTERVAL = 1e-3
-"""Time [s] between what is looked at, at least: the next whole number of samples."""
+"""Least time [s] between evaluated samples: the next whole number of samples."""
 
 FOLLOWED, LONGER = 40, 6
-"""Machines that are run again for so many times as long: an integrator that was reset may swing that slowly."""
+"""Machines that are run again, and the factor on their duration, because an integrator that was reset may swing that
+slowly."""
 
 NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
-"""Longer runs of an option that need not be run."""
+"""Result for an option that needs no longer runs."""
 
 ENOUGH = 0.99
-"""Share of the machines that an option has to bring into position to be called one that brings them to rest."""
+"""Fraction of the machines that an option must bring into position to count as bringing them to rest."""
 
 LATEST = 0.5
-"""Share of the run by which the reference has to stand: lasting swings are looked for in what follows."""
+"""Latest time, over the duration, at which the reference may come to stand, because lasting swings are sought
+afterwards."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class OptionResult:
 
     @property
     def settling(self) -> EstimatedValue:
-        """Median [s] over all machines, those that never settle included."""
+        """Return the median settling time [s] over all machines, including those that never settle."""
         return median(self.measures.settling)
 
     @property
@@ -115,7 +117,7 @@ class OptionResult:
 
     @property
     def in_position_count(self) -> int:
-        """Machines that are in position to stay by the end of the run."""
+        """Return the number of machines that are in position to stay by the end of the run."""
         return int(self.measures.rests.sum())
 
     @property
@@ -127,11 +129,11 @@ class OptionResult:
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a on the same machines.
+    """An option against option a on paired machines.
 
-    It has the increase in the probability of swinging at the end. Shares of machines are in position `sooner`, `later`
-    and `alike` (also if never with both). The medians are the factors on the root mean squares in position and of the
-    force.
+    It has the increase in the probability of swinging at the end. Fractions of machines are in position `sooner`,
+    `later` and `alike` (also if never with both). The medians are the factors on the root mean squares in position and
+    of the force.
     """
 
     swinging: EstimatedValue
@@ -146,8 +148,8 @@ class Paired:
 class Comparison:
     """The results of all options on machines drawn with a seed, with tolerance [m] and notes.
 
-    `needed` says which bandwidth the controller alone needs. No faster controller exceeds `bandwidth_limit` [Hz]. The
-    options `not_run` were left by an interruption.
+    `needed` gives the bandwidth that the controller alone needs. No faster controller exceeds `bandwidth_limit` [Hz].
+    The options `not_run` were skipped by an interruption.
     """
 
     machines: Machines
@@ -168,7 +170,7 @@ class Comparison:
     def shaken(self) -> bool:
         """Tell whether a floor shakes the machines.
 
-        Without one their standstill shows whether they rest, and not how still.
+        Without one their standstill shows whether they rest, not how still they stand.
         """
         return self.stage.floor is not None
 
@@ -237,7 +239,7 @@ def compare(
 
 
 def _places(stage: Stage) -> list[Stand]:
-    """Return where the reference comes to stand.
+    """Return the places at which the reference comes to stand.
 
     Raises InputError if that is too late, or never.
     """
@@ -256,8 +258,7 @@ def _places(stage: Stage) -> list[Stand]:
 class _Work:
     """Inputs that all options share.
 
-    They are the machines, their task, the places where its reference stands, the tolerance [m], the receiver of
-    progress, and the number of options.
+    They are machines, task, places of the reference, tolerance [m], progress, and number of options.
     """
 
     machines: Machines
@@ -313,7 +314,7 @@ def _missing(stage: Stage) -> list[str]:
 
 
 def _troubles(results: list[OptionResult], count: int) -> list[str]:
-    """Unstable loops and runs that failed, option by option."""
+    """Return unstable loops and failed runs by option, in words."""
     failed = "the intervals of probabilities allow for either outcome of these, medians leave them out"
     notes = []
     for result in results:

@@ -1,1 +1,1 @@
-"""Friction laws side by side: from one to another, and the verdict under each that keeps what is measured."""
+"""Convert friction laws into each other, and judge a stage under each law that fits the measurements."""

@@ -1,6 +1,7 @@
-"""The nearest curve to points that springs side by side can have which slip one after the other: from 0, concave and
-never falling, by least squares. Knots nearest to rest that the points do not bear out only follow their noise, and
-are left out."""
+"""Fit the nearest concave, rising curve from 0 to points, as parallel springs that slip in turn can make.
+
+The fit is by least squares. Knots near rest that the points do not support only follow noise, and are left out.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +18,9 @@ from friso.studies.settings import StudySettings
 class ConcaveFit:
     """A concave curve from 0 to its end over increasing `knots`, shape (n,).
 
-    `strength`, shape (2, n), says how much of it ends at each knot, of two kinds: straight up to the knot, and bent so
-    that its slope falls to 0. It has the standard error of its first slope, -2 times the logarithm of its likelihood,
-    and the number of free parameters.
+    `strength`, shape (2, n), is the part that ends at each knot, of two kinds: straight up to the knot, and bent so
+    that its slope falls to 0. Further fields are the standard error of the initial slope, -2 times the logarithm of the
+    likelihood, and the number of free parameters.
     """
 
     knots: np.ndarray
@@ -30,41 +31,41 @@ class ConcaveFit:
 
     @property
     def corners(self) -> np.ndarray:
-        """Return the knots at which something ends, shape (at most n,)."""
+        """Return the knots at which a part ends, shape (at most n,)."""
         return self.knots[self.strength.any(axis=0)]
 
     @property
     def akaike(self) -> float:
-        """Akaike's criterion: the likelier, the less."""
+        """Return Akaike's criterion; a smaller one is more likely."""
         return self.misfit + 2 * self.free
 
     @property
     def slope(self) -> float:
-        """At the start."""
+        """Return the slope at the start."""
         return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Return the curve at x, of its shape (m,): level from the last knot on."""
+        """Return the curve at x, of its shape (m,), constant beyond the last knot."""
         return _shapes(x, self.knots) @ self.strength.ravel()
 
 
 _SLOPES = np.array([1.0, 2.0])
-"""First slopes of both kinds, in units of their ends over their knots."""
+"""Initial slopes of both kinds, in units of their ends over their knots."""
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Return both kinds of curves with ends of 1 at x, shape (m, 2 n).
 
-    Below 0, where noise may lead, they go straight on.
+    Below 0, where noise may lead, they continue straight.
     """
     reached = np.minimum(x[:, None] / knots, 1.0)
     return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])
 
 
 def knots_of(x: np.ndarray) -> np.ndarray:
-    """Return where points, shape (m,), let a curve bend: at each but 0, or at some of them.
+    """Return the knots at which a curve through points, shape (m,), may bend: all but 0, or some of them.
 
-    They are closer together near 0, but not closer than x itself scatters.
+    They are closer together near 0, but not closer than the scatter of x.
     """
     settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
@@ -84,7 +85,7 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
     """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`.
 
     They are straight between their knots, or bent too if there are many, and with the first few knots left out. Beyond
-    the points they go on as these end, at most as far again.
+    the points they continue with the final slope, at most as far again.
     """
     settings = StudySettings.current()
     knots = knots_of(x)
@@ -115,7 +116,7 @@ def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
 
 
 def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: int, end: float) -> ConcaveFit:
-    """One of them, from the equations `rows` of all."""
+    """Fit one curve from the equations `rows` of all."""
     settings = StudySettings.current()
     used = np.arange(2 * len(knots)).reshape(2, -1)[: 1 + bent, first:].ravel()
     weights, away = nnls(rows[:, used], rows[:, -1], maxiter=settings.fit_steps)

@@ -1,4 +1,4 @@
-"""From one friction law to another that fits the same measurements, and what could not be kept."""
+"""Convert one friction law to another that fits the same measurements, and report what is lost."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virg
 from friso.studies.settings import StudySettings
 
 ELEMENTS = 6
-"""Elements of a law that has several, unless told otherwise."""
+"""Default number of elements of a law with several."""
 
 KEPT = 1e-6
-"""Relative difference below which a number is kept."""
+"""Relative difference below which a number counts as unchanged."""
 
 SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
@@ -41,9 +41,9 @@ sliding, and its stiffness from end to end."""
 
 @dataclass(frozen=True)
 class MeasuredChange:
-    """One measured quantity, `before` and `after` the conversion [unit], and its error.
+    """A measured quantity `before` and `after` the conversion [unit], and its error.
 
-    The error is a share of static friction for curves, and of the number itself for numbers. The quantity is kept if
+    The error is relative to static friction for curves, and to the number itself for numbers. The quantity is kept if
     the error is below `allowed`. The `amplitude` [m] is that of a loop.
     """
 
@@ -65,7 +65,7 @@ class MeasuredChange:
 class LawConversion:
     """A stage converted to another friction law.
 
-    It has the source, the quantities compared, and the keys that the measurements leave open, with their ranges [SI].
+    It has the source, the compared quantities, and the keys that the measurements leave open, with their ranges [SI].
     It names the condition of passivity that the law violates ("" if it is passive). `points` are the measured points of
     the virgin curve, unless the curve is that of the source's law.
     """
@@ -146,7 +146,7 @@ def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapp
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
-    """Return the stage with the named law in the place of its own, with such keys [SI]."""
+    """Return the stage with another friction law and its keys [SI]."""
     return stage.replace({"friction": _table(stage, law, keys)})
 
 
@@ -159,7 +159,7 @@ def compared(
 ) -> LawConversion:
     """Compare a stage `made` from another with the friction measured `before`.
 
-    The measurement may be given by `points`. Also holds what it leaves open in the new stage.
+    The measurement may be given by `points`. The result includes the keys that it leaves open in the new stage.
     """
     flat = made.flat()
     after = measure_friction(flat)
@@ -176,10 +176,7 @@ def compared(
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
-    """Yield area and stiffness of slow loops under both laws, at shares of break-away.
-
-    The shares are of the deflection of break-away.
-    """
+    """Yield area and stiffness of slow loops under both laws, at fractions of the deflection at break-away."""
     settings = StudySettings.current()
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:
@@ -211,7 +208,7 @@ def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
 
 
 def _text(value: float, unit: str) -> Any:
-    """Return a value as a stage file has it, read again as the same number."""
+    """Return a value as text of a stage file, which reads back as the same number."""
     return exactly(value, unit) if unit else value
 
 
@@ -221,7 +218,7 @@ def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> Measu
 
 
 def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
-    """Steady friction, where the curves are farthest apart, forward and back."""
+    """Return steady friction at the largest difference of both curves, forward and back."""
     speeds = SPEEDS * before.levels.stribeck_velocity
     old, new = (
         np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
@@ -232,7 +229,7 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """Return the virgin curve, where the two are farthest apart; or the points, which scatter."""
+    """Return the virgin curve at the largest difference of both, or of the scattered points."""
     settings = StudySettings.current()
     if not after.stiffness:
         return MeasuredChange(

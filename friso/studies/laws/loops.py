@@ -1,4 +1,4 @@
-"""Compute hysteresis loops of friction laws: force over a slow motion to and fro, before sliding."""
+"""Compute hysteresis loops of friction laws: force over a slow motion back and forth, before sliding."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from friso.studies.settings import StudySettings
 class HysteresisLoop:
     """A loop of force over displacement between `amplitude` [m] to either side of rest.
 
-    It encloses the `area` [J], the energy lost in one period. Its `stiffness` [N/m] is the difference of the forces at
-    both ends over that of the places.
+    It encloses the `area` [J], the energy lost in one period. `stiffness` [N/m] is the difference of the forces at both
+    ends over that of the displacements.
     """
 
     amplitude: float
@@ -31,7 +31,7 @@ class HysteresisLoop:
 def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> HysteresisLoop:
     """Compute the last of several loops of a stage's friction law, given as flat keys.
 
-    A body is dragged to and fro at a steady `speed` [m/s], from rest with unbent bristles.
+    A body is moved back and forth at a steady `speed` [m/s], from rest with unbent bristles.
     """
     settings = StudySettings.current()
     law, points = flat["friction.model"], settings.points_of_a_loop

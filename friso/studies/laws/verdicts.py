@@ -1,4 +1,4 @@
-"""The verdict on a stage under every friction law that keeps what is measured of it."""
+"""Judge a stage under every friction law that keeps its measured friction."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from friso.studies.laws.conversion import (
 )
 
 NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "viscous"))
-"""Measured quantities that a law has to keep to be tried."""
+"""Measured quantities that a law must keep to be tried."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A stage under a law, with the keys `drawn` [SI] from what is left open, and its cases.
+    """A stage under a law, with the keys `drawn` [SI] from those left open, and its cases.
 
     See `friso.hunting.check`.
     """
@@ -43,7 +43,7 @@ class Trial:
     cases: Mapping[str, Case]
 
     def attracted(self, case: str) -> bool:
-        """Tell whether something attracts the stage that hunts, in a case."""
+        """Tell whether the stage has a stable limit cycle in a case."""
         return self.cases[case].verdict in ATTRACTED
 
     def certain(self, case: str) -> bool:
@@ -76,13 +76,13 @@ class LawVerdict:
         return self.conversion.law
 
     def verdicts(self, case: str) -> tuple[str, ...]:
-        """Return the verdicts in a case, each once."""
+        """Return the distinct verdicts in a case."""
         return tuple(dict.fromkeys(trial.cases[case].verdict for trial in self.trials))
 
     def answers(self, case: str) -> set[bool]:
         """Return the certain answers to whether the stage hunts under the law in a case.
 
-        There are both if that depends on what is left open.
+        There are two if the answer depends on keys left open.
         """
         return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
 
@@ -93,7 +93,7 @@ class LawVerdict:
     def hunts(self, case: str) -> bool | None:
         """Tell whether the stage hunts under the law in a case.
 
-        None if that is not certain, or depends on what is left open.
+        None if that is not certain, or depends on keys left open.
         """
         answers = self.answers(case)
         return answers.pop() if len(answers) == 1 and self.certain(case) else None
@@ -101,8 +101,8 @@ class LawVerdict:
     def edges(self, case: str) -> tuple[float, float] | None:
         """Return the lowest and highest edge of hunting [Hz] in a case; None without any.
 
-        They are factors of the bandwidth if there is no crossover. A certain edge extends as far as it is known to
-        both sides, an uncertain one up to where none was found.
+        They are factors of the bandwidth if there is no crossover. A certain edge extends by its error to both sides,
+        an uncertain one up to where no attractor was found.
         """
         margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
         units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
@@ -126,7 +126,7 @@ class LawVerdict:
         return all(trial.edge_sought(case) for trial in self.trials)
 
     def amplitudes(self, case: str) -> tuple[float, float] | None:
-        """Smallest and largest amplitude [m] of the hunting in a case; None without any."""
+        """Return the smallest and largest amplitude [m] of hunting in a case; None without hunting."""
         cycles = [trial.cases[case].judgement.cycle for trial in self.trials if trial.attracted(case)]
         sizes = [cycle.amplitude for cycle in cycles if cycle]
         return (min(sizes), max(sizes)) if sizes else None
@@ -134,7 +134,7 @@ class LawVerdict:
 
 @dataclass(frozen=True)
 class VerdictsByLaw:
-    """The verdicts by law, the stage's own first, and the laws `left_out`, with what they lose."""
+    """The verdicts by law, the stage's own first, and the laws `left_out`, with the quantities that they lose."""
 
     stage: Stage
     verdicts: tuple[LawVerdict, ...]
@@ -146,19 +146,16 @@ class VerdictsByLaw:
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Tell whether the stage hunts in a case, whatever the law.
-
-        None if that depends on the law or is not certain.
-        """
+        """Tell whether the stage hunts in a case under all laws; None if that depends on the law or is not certain."""
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
     def answers(self, case: str) -> set[bool]:
-        """Tell whether the stage hunts in a case, by all verdicts that are certain."""
+        """Return all certain answers to whether the stage hunts in a case."""
         return set().union(*(verdict.answers(case) for verdict in self.verdicts))
 
     def depends_on_law(self, case: str) -> bool:
-        """Tell whether verdicts that are certain disagree in a case."""
+        """Tell whether certain verdicts differ in a case."""
         return len(self.answers(case)) > 1
 
     def uncertain(self, case: str) -> list[str]:
@@ -168,7 +165,7 @@ class VerdictsByLaw:
     def deciding(self, case: str) -> list[str]:
         """Return the experiments that would decide between different answers of friction laws.
 
-        If the answer depends on values left open in a law, they are the experiments that show these values. Otherwise
+        If the answer depends on keys left open in a law, they are the experiments that determine these keys. Otherwise
         they separate laws that disagree, or are not certain, from the others.
         """
         if self.hunts(case) is not None or not self.answers(case):
@@ -194,9 +191,9 @@ class VerdictsByLaw:
 def verdicts_by_law(
     stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
-    """Check a stage under each law that keeps what is measured of its own.
+    """Check a stage under each law that keeps its measured friction.
 
-    Raises InputError for a law that does not declare what that is.
+    Raises InputError for a law that does not declare measurable friction.
     """
     conversions, left_out = kept_laws(stage, elements)
     planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
@@ -216,10 +213,7 @@ def verdicts_by_law(
 
 
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
-    """Return the stage under its own and other laws that keep what is measured of it.
-
-    Also returns what the remaining laws lose.
-    """
+    """Return the stage under its own and other laws that keep its measured friction, and what the others lose."""
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
     left_out: dict[str, tuple[MeasuredKind, ...]] = {}
@@ -242,11 +236,11 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 
 
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
-    """Return the friction of stages under every other law that keeps what is measured of each.
+    """Return the friction of stages under every other law that keeps the measured friction of each.
 
-    The stages differ in numbers of their friction. Friction is given as converted and at both ends of what is left
-    open, by the name of the law and of what is open. Laws that keep it for some stages only are lost. Raises
-    InputError for a law that does not declare what is measured of it.
+    The stages differ in numbers of their friction. Friction is given as converted and at both ends of keys left open,
+    by the names of law and key. Laws that keep it for some stages only are dropped. Raises InputError for a law that
+    does not declare measurable friction.
     """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
@@ -267,12 +261,12 @@ def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> Ot
 
 
 def _together(values: Sequence[Any]) -> Any:
-    """Return a value that all have, or else an array of them."""
+    """Return the common value, or an array of different values."""
     return values[0] if all(value == values[0] for value in values) else np.array(values)
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """Return the values to try of what the measurements leave open [SI].
+    """Return the values [SI] to try of keys that the measurements leave open.
 
     They are as converted, "", and at the "least" and "most" of the ranges; the stage's own law has one trial.
     """

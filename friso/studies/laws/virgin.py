@@ -1,4 +1,4 @@
-"""A virgin curve that was measured: points of force over displacement from rest, in place of what a law says."""
+"""Read a measured virgin curve: points of force over displacement from rest, in place of that of a law."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from friso.studies.laws.concave import concave_fits
 from friso.studies.settings import StudySettings
 
 EXAMPLE = "displacement [um],force [N]"
-"""Heading of a file with such a curve."""
+"""Example heading of a file with a virgin curve."""
 
 
 ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
-"""Displacements from which the force may begin, in units of that at which it is a third of static friction."""
+"""Displacements at which the force may begin, in units of that at a third of static friction."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class VirginPoints:
     """Points of a virgin curve.
 
     `displacement` [m] and `force` [N] have the shape (n,). The standard deviation is that of the scatter of the force
-    [N]. The range of the first slope [N/m] allowed by the points reaches up to infinity if they lie too far from rest.
+    [N]. The range of the initial slope [N/m] reaches up to infinity if the points lie too far from rest.
     """
 
     displacement: np.ndarray
@@ -38,22 +38,19 @@ class VirginPoints:
     stiffness: tuple[float, float]
 
     def means(self, force: np.ndarray) -> np.ndarray:
-        """Average forces [N] at the displacements, shape (n,), over neighbouring points.
-
-        There are so many neighbours that their scatter hardly counts, if there are many points.
-        """
+        """Average forces [N] at the displacements, shape (n,), over enough neighbouring points to suppress scatter."""
         return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
 
     @property
     def together(self) -> int:
-        """Return how many points a mean is of."""
+        """Return the number of points in a mean."""
         settings = StudySettings.current()
         wanted = (self.usual / (settings.curve_error * max(self.force))) ** 2
         return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // settings.most_knots, 1)))
 
     @property
     def usual(self) -> float:
-        """Return how far the farthest of so many points is off by scatter alone [N]."""
+        """Return the expected largest deviation [N] of the points by scatter alone."""
         return self.scatter * float(np.sqrt(2 * np.log(len(self.force))))
 
 
@@ -90,7 +87,7 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
 
 
 def _channel(path: str | os.PathLike[str], candidates: list[tuple[np.ndarray, float | None]], unit: str) -> np.ndarray:
-    """Return the one channel that can be turned into this unit, in it."""
+    """Return the only channel that can be converted to a unit, in that unit."""
     in_unit = [values * factor for values, factor in candidates if factor is not None]
     if len(in_unit) != 1:
         raise _refused(
@@ -152,5 +149,5 @@ def with_virgin_curve(
 
 
 def _scatter(residual: np.ndarray) -> float:
-    """Return the standard deviation of what is not smooth in it, shape (n,)."""
+    """Return the standard deviation of the rough part of a residual, shape (n,)."""
     return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2))

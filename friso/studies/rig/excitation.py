@@ -1,4 +1,4 @@
-"""A multisine injected into the closed loop at a standstill, and what it shows of plant and open loop."""
+"""Inject a multisine into the closed loop at standstill, and estimate plant and open loop."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import standing
 
 PERIOD, PERIODS = 8.0, 8
-"""Periods of the crossover in one of the multisine, which is the inverse of its lowest line (1 Hz on the thesis's rig),
-and how often it is played."""
+"""Length of a period of the multisine in periods of the crossover, the inverse of its lowest line (1 Hz on the thesis's
+rig), and number of periods."""
 
 FINEST = 0.4
-"""The highest line over the log's rate at most."""
+"""Highest line over the sampling rate of the log."""
 
 PHASES = int.from_bytes(b"sines")
-"""Which of a seed's random numbers the phases take."""
+"""Second half of the random generator's key for the phases."""
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """Choices for the excitation of a frequency response.
+    """Settings of the excitation of a frequency response.
 
-    They are the RMS of the injected force over static friction, and the highest line over the crossover. Then come the
-    approximate number of lines, evenly spaced in the logarithm, and samples of the log per period of the crossover.
+    They are the RMS of the injected force over static friction, the highest line over the crossover, the approximate
+    number of lines, evenly spaced in the logarithm, and samples of the log per period of the crossover.
     """
 
     strength: float

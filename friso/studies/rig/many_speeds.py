@@ -1,9 +1,9 @@
-"""Passes at many speeds, the joint locked and the controller made faster: the whole curve of friction over velocity.
+"""Run passes at many speeds with a locked joint and a faster controller: the whole curve of friction over velocity.
 
-Where friction falls with the speed a slow loop sticks and slips, and what its passes show is no steady friction. The
-faster the controller, the more it damps: the fastest of a few settings is taken at which most passes are steady. All
-passes go the same stretch, so that what differs between them is the speed and not the place; quick ones begin before it
-and end behind, if need be beyond the stage's own travel: the rig's rail has no ends.
+Where friction falls with speed a slow loop sticks and slips, so its passes show no steady friction. A faster controller
+damps more: of a few settings the fastest is taken at which most passes are steady. All passes cover one stretch, so
+that they differ in speed and not in place; fast ones begin before it and end behind, if necessary beyond the stage's
+own travel, because the rig's rail has no ends.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 
 FASTER = (4.0, 3.0, 2.0, 1.5, 1.0)
-"""Crossovers over the stage's own that are tried, one after the other: our choice."""
+"""Crossovers over the stage's own that are tried in turn (friso's choice)."""
 
 SPEEDS, RATIO = 14, 500.0
-"""Number of speeds, and the greatest over the least: 0.48 to 240 mm/s on the thesis's rig, at four times its
-crossover."""
+"""Number of speeds, and ratio of highest to lowest: 0.48 to 240 mm/s on the thesis's rig, at four times its crossover.
+"""
 
 CURVE = 200
-"""Points of the true curve."""
+"""Number of points of the true curve."""
 
 SHORTEST = 20.0
-"""Periods of the crossover that the longest way takes at the greatest speed."""
+"""Periods of the crossover for the longest way at the highest speed."""
 
 MOST = 0.5
-"""Share of the passes that are steady at a setting which is taken."""
+"""Least fraction of steady passes at an accepted setting."""
 
 SHARED, PLACES = 1 / 8, 3
-"""Share of the longest way that all of them go, and places along the travel where they do: our choice."""
+"""Common part of all ways over the longest, and number of places along the travel (friso's choice)."""
 
 STANDS, SAMPLES = 16.0, 62.5
 """Periods of the crossover for which the reference stands between passes, and samples of the log per period of the
-stage's own (2 ms)."""
+stage's own crossover (2 ms)."""
 
 
 @dataclass(frozen=True)
 class PlaceOnRail:
     """Passes on one stretch of the rail.
 
-    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], over the way on
-    which it was read. Both have the shape (n,).
+    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], over that stretch.
+    Both have the shape (n,).
     """
 
     log: RigLog
@@ -65,9 +65,9 @@ class PlaceOnRail:
 
     @property
     def friction(self) -> np.ndarray:
-        """Return friction [N] of the steady passes, shape (passes,), without the constant force.
+        """Return friction [N] of the steady passes, shape (passes,), without constant forces.
 
-        Such a force does not turn with the motion: the pull of a cable, for example.
+        The pull of a cable, for example, does not turn with the motion.
         """
         bias = self.velocity.bias.value if self.velocity.bias.determined else 0.0
         return np.abs(self.velocity.forces - bias)
@@ -75,7 +75,7 @@ class PlaceOnRail:
 
 @dataclass(frozen=True)
 class ManySpeeds:
-    """The crossover [Hz] at which the passes went, and what they show at each of the places."""
+    """The crossover [Hz] of the passes, and their results at each place."""
 
     crossover: float
     places: tuple[PlaceOnRail, ...]
@@ -112,7 +112,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
 
 
 def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Mean dynamic friction [N] at speeds [m/s], shape (n,), over places [m] on the rail."""
+    """Return mean dynamic friction [N] at speeds [m/s], shape (n,), over places [m] on the rail."""
     flat: Mapping[str, Any] = anywhere(stage.flat())
     levels = zip(("friction.static", "friction.coulomb"), friction_factors(flat, places).mean(axis=1), strict=True)
     along = {key: flat[key] * factor for key, factor in levels if key in flat}
@@ -120,7 +120,7 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 
 
 def _begins(stage: Stage) -> np.ndarray:
-    """Return where the stretches begin [m]."""
+    """Return the beginnings of the stretches [m]."""
     low, high = travel(stage)
     return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
@@ -132,7 +132,7 @@ def controller_speeds(stage: Stage) -> np.ndarray:
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
-    """Return the passes over the stretch that begins at a place [m], ever faster."""
+    """Return the passes over the stretch from a place [m], in order of rising speed."""
     period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
     for speed in controller_speeds(stage):

@@ -1,4 +1,4 @@
-"""Moves of a machine on repeated rails, and the cycles that they end in."""
+"""Run moves of a machine on repeated rails, and evaluate the final swings."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 
 RAILS = 20
-"""Rails on which a machine is repeated: our choice."""
+"""Rails on which a machine is repeated (friso's choice)."""
 
 DURATION = 20.0
 """Least duration of a run [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
 
 INTERVAL = 1e-3
-"""Between the samples of a log, at most [s]: the thesis states none."""
+"""Longest sample time of a log [s]; the thesis states none."""
 
 BAND = COUNTED_ABOVE
-"""Band about the reference [m] within which a run rests: the height from which the thesis counts peaks."""
+"""Band about the reference [m] within which a run rests: the height above which the thesis counts peaks."""
 
 ROUND = (1.0, 2.0, 5.0, 10.0)
-"""Numbers to which a length is rounded, times a power of ten."""
+"""Mantissas to which a length is rounded."""
 
 
 def distance(stage: Stage) -> float:
@@ -51,7 +51,7 @@ def distance(stage: Stage) -> float:
 
 
 def duration(stage: Stage) -> float:
-    """Duration of a run [s]."""
+    """Return the duration of a run [s]."""
     return max(DURATION, float(stage.flat()["motion.duration"]))
 
 
@@ -122,14 +122,14 @@ def rails(stage: Stage) -> np.ndarray:
 
 
 def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
-    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,), rails fastest."""
+    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,), with rails varying fastest."""
     count = len(next(iter(cases.values())))
     repeated = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     return repeated if stage.rail is None else {**repeated, "rail.seed": np.tile(seeds, count)}
 
 
 def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
-    """Seeds of the noise of cases on machines: that of a machine is the same in all cases."""
+    """Return seeds of the noise of cases on machines; a machine has one seed in all cases."""
     return [seed + machine for _ in range(cases) for machine in range(machines)]
 
 
@@ -141,7 +141,7 @@ class RailRuns:
     - `outcome`: words of `friso.hunting.criteria.run_outcome`, with `BAND` as band.
     - `swing` [m], peak to peak, and `period` [s] of the last quarter (NaN: none).
     - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
-    - `rising`: share of the period in which the deviation rises.
+    - `rising`: fraction of the period in which the deviation rises.
     - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: of the heights over the swing
       (NaN with fewer than three swings).
 
@@ -174,16 +174,16 @@ class RailRuns:
         return self.peaks > 0
 
     def shaped(self, *shape: int) -> RailRuns:
-        """Return the same results with arrays of another shape."""
+        """Return the results with arrays of another shape."""
         return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
-        """Return the share of some runs that have a peak that counts, with its 95 % interval."""
+        """Return the fraction of some runs that have a counted peak, with its 95 % interval."""
         return share(self.counted[which], ~self.failed[which])
 
 
 def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> RecordedRuns:
-    """Return a few runs, all samples of which are kept."""
+    """Return a few runs with all samples."""
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
 
@@ -203,7 +203,7 @@ def run_moves(
     progress: Progress = silent,
     label: str = "",
 ) -> RailRuns:
-    """Run a task and evaluate the runs; the samples are forgotten chunk by chunk."""
+    """Run a task and evaluate the runs; samples are dropped chunk by chunk."""
     parts: list[RailRuns] = []
     progress(0, len(seeds), label)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
@@ -213,7 +213,7 @@ def run_moves(
 
 
 def rail_runs(recorded: RecordedRuns) -> RailRuns:
-    """Evaluate the runs of a chunk, by the position as the drive logs it."""
+    """Evaluate the runs of a chunk, by the logged position."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]
     deviation[failed] = 0.0
@@ -235,7 +235,7 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and values [m] at which sampled values turn, those of a flat stretch at its end."""
+    """Return times [s] and values [m] at which sampled values turn; a flat stretch counts at its end."""
     ways = np.sign(np.diff(values))
     moving = np.flatnonzero(ways)
     turned = moving[1:][ways[moving[1:]] * ways[moving[:-1]] < 0]
@@ -243,7 +243,7 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Return the swings in the last half of a run: above, below, rising, and two scatters.
+    """Return the shape of swings in the last half of a run: above, below, rising, and two scatters.
 
     They follow from turning points, times [s] and values [m]; the scatters are those of period and of height, as in
     `RailRuns`.

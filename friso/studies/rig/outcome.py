@@ -37,7 +37,7 @@ class RigLog:
 
     @property
     def log(self) -> Log:
-        """As `friso identify` has it once it has read it."""
+        """Return the log as `friso identify` reads it."""
         return record(self.name, self.interval, **self.logged)
 
 
@@ -54,7 +54,7 @@ class Outcome:
 
 
 def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
-    """One run of a chunk as a log, up to where it failed."""
+    """Return one run of a chunk as a log, up to a failure."""
     status = int(recorded.statuses[row])
     count = recorded.logged["position"].shape[1]
     if status != Status.DONE:
@@ -77,14 +77,14 @@ def stopped(log: RigLog) -> InputError:
 
 
 WINDOWS, SATURATED = 20, 0.1
-"""Parts into which a log is cut to see whether its loop is stable, and the share of a part that its command spends at
-either limit where it is not."""
+"""Parts of a log in the test for stability, and the fraction of a part that the command of an unstable loop spends at
+either limit."""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
     """Return the number of samples after which a command [N], (n,), only swings between limits.
 
-    It is 0 if it comes to rest, or has no limits.
+    It is 0 if the command comes to rest, or has no limits.
     """
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)

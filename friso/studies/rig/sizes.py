@@ -1,7 +1,7 @@
-"""Set the sizes, durations and places of the experiments, all taken from the stage.
+"""Choose sizes, durations and places of the experiments from the stage.
 
-Times are in periods of the controller's crossover, ways in those of the stage's own motion, deflections in strokes,
-forces in those of friction. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they are as in the thesis.
+Times are in periods of the controller's crossover, distances in lengths of the stage's own motion, deflections in
+strokes, and forces in friction forces. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) the values are those of the thesis.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import own_motion
 
 WIDE = 8.0
-"""Stroke of the identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
+"""Stroke during identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
 
 WAY = 5 / 3
 """Way at constant speed over that of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
 
 ALPHA = 0.1
-"""The alpha of the van Dijk controller to which plain gains are compared, as in the thesis."""
+"""Alpha of the van Dijk controller to which plain gains are compared, as in the thesis."""
 
 FIXED = 1e9
-"""Mass [kg] of a cart that does not move."""
+"""Mass [kg] of a cart that practically does not move."""
 
 
 _FREE = 'stiffness = "2.4 N/mm", damping = "0.5 N*s/m", stroke = "1 mm"'
@@ -73,7 +73,7 @@ def locked_stage(stage: Stage) -> Stage:
 def pace(stage: Stage) -> float:
     """Return the controller's crossover [Hz].
 
-    For plain gains it is that of a van Dijk controller with the same proportional gain.
+    For plain gains it is that of a van Dijk controller with equal proportional gain.
     """
     flat = stage.flat()
     named = bandwidth(flat)
@@ -109,9 +109,6 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def interval(stage: Stage, length: float) -> float:
-    """Return the time between samples of a log [s], at most `length`.
-
-    It is a whole number of the drive's samples.
-    """
+    """Return the sample time of a log [s], at most `length`, a whole number of the drive's samples."""
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

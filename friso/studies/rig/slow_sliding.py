@@ -1,7 +1,7 @@
-"""Slow sliding, the joint locked: friction that falls so steeply that no controller holds a constant speed.
+"""Run slow sliding with a locked joint, where friction falls so steeply that no controller holds a constant speed.
 
-After the passes of `many_speeds`, short ones at speeds at the edge of what is steady, logged finely: there the motion
-swings through the whole of the falling branch.
+Short, finely logged passes follow those of `many_speeds`, at speeds at the limit of steady motion: the motion swings
+through the whole falling branch.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
 
 UNSTEADY, STEADY, PLACES = 2, 1, 8
-"""How many of the fastest speeds that were not steady it goes, and of the slowest that were; at so many places along
-the travel, since each log shows the friction of a few millimetres alone."""
+"""Numbers of speeds: of the fastest that were not steady, and of the slowest that were; and number of places along the
+travel, because each log shows the friction of a few millimetres."""
 
 APART = 4
-"""Where all were steady, it goes every fourth of their speeds, from the least on."""
+"""Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
 
 POINTS = 500
-"""Points of a way, for its mean friction."""
+"""Points of a way for its mean friction."""
 
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
 """Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4
@@ -75,7 +75,7 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
-    """Speeds [m/s] at the edge of what was steady; where all were, some from the least on."""
+    """Return speeds [m/s] at the limit of steady motion, or some from the lowest on if all were steady."""
     speeds = controller_speeds(passed[0].stage)
     unsteady = {
         int(np.argmin(np.abs(np.log(speeds / abs(stretch.velocity)))))

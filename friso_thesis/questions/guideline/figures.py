@@ -37,14 +37,15 @@ ENDS = {
 }
 HALVES = (Category("samples of the fit", LIGHT), Category("samples held out", BLUE))
 FULL = 1.0
-"""Joint force at full stroke over static friction from which a stroke counts as ample in the chart of the joint."""
+"""Joint force at full stroke, relative to static friction, from which the chart of the joint treats a stroke as ample.
+"""
 
 
 SHARES = 5.0
-"""Share of the joint's effect up to which the chart of the stroke goes at most."""
+"""Upper end of the chart of the stroke, as a multiple of the joint's effect."""
 
 FINER = 10
-"""Places per step between two computed edges at which a law is drawn."""
+"""Points of a drawn law per step between two computed edges."""
 
 
 def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
@@ -101,7 +102,7 @@ def _free(guideline: Guideline) -> Figure:
 
 
 def _stroke(guideline: Guideline) -> Figure:
-    """Return the share of a joint's effect that is left with its stroke."""
+    """Return the fraction of a joint's effect that is left with its stroke."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
     joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2
@@ -125,7 +126,7 @@ def _stroke(guideline: Guideline) -> Figure:
 
 
 def _against(guideline: Guideline) -> Figure:
-    """Edges by the laws against computed ones, samples of the fit and samples held out."""
+    """Draw edges by the laws over computed ones, for samples of the fit and held-out samples."""
     locked, free = guideline.locked, guideline.free
     predicted = [
         free.law.edge(sweep.values, locked.law.edge(sweep.values)) for sweep in (free.fit.usable, free.test.usable)
@@ -195,7 +196,7 @@ def _studied(title: str, x: Axis, cases: Sequence[ThesisCase], laws: Laws) -> Pa
 
 
 def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
-    """Samples coloured by what becomes of the cycle at their edge."""
+    """Return samples coloured by the kind of their edge."""
     words = list(ENDS)
     codes = np.array([float(words.index(kind)) for kind in sweep.edges.kind.astype(str)])
     present = tuple(ENDS.values())

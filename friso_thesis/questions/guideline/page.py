@@ -33,10 +33,10 @@ PAGE, TABLE = "guideline.md", "guideline_edges.csv"
 
 
 FAR = 1.5
-"""Factor from which an edge counts as far off the law."""
+"""Ratio of computed edge and law from which the edge counts as far off."""
 
 RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**ROUNDS - 1 for grid in (LOCKED_GRID, FREE_GRID))
-"""Width of the last step of a bisection, over the edge in it."""
+"""Relative width of the last step of a bisection."""
 
 CONSTANTS: Mapping[str, Any] = {
     "below": BELOW,
@@ -102,7 +102,7 @@ def guideline_page(guideline: Guideline) -> str:
 
 
 ONE_WINDOW = "with one window (a diagnosis)"
-"""Name of the rows of samples in which a cycle attracts up to the edge without a break."""
+"""Name of the table rows of samples in which a cycle attracts up to the edge without a gap."""
 
 
 def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:

@@ -19,11 +19,11 @@ BASES = {
     "joint": "sqrt(k_j/m)",
     "stroke": "sqrt(F_s/(m S_j))",
 }
-"""Base of each rate, without its factor and powers [rad/s]."""
+"""Formula of each rate [rad/s], without its factor and powers."""
 
 
 RULE = 2.0
-"""Factor up to which multiples of the crossover may differ and still pass for one rule."""
+"""Largest ratio of multiples of the crossover that still count as one rule."""
 
 
 def formulas(guideline: Guideline) -> str:
@@ -67,7 +67,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def log_error(off: float) -> str:
-    """Return an error of a logarithm as a share: 0.1 is 11 %."""
+    """Return an error of a logarithm as a fraction: 0.1 is 11 %."""
     return f"{percent(math.expm1(off))}"
 
 
@@ -91,8 +91,11 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 
 
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
-    """Return where the ranges of crossovers end, joint locked and free,
-    by the damping ratio of the mode; and whether one multiple of the crossover is a rule for all modes."""
+    """Say where the ranges of crossovers end, by the damping ratio of the mode.
+
+    They are given with the joint locked and free. It is also said whether one multiple of the crossover is a rule for
+    all modes.
+    """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
     if ratios and max(ratios) > RULE * min(ratios):

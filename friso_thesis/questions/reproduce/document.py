@@ -42,7 +42,7 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("cannot be decided", "cannot be decided by simulation", "cannot be decided by simulation"),
     ("not yet covered", "is not covered", "are not covered"),
 )
-"""The judgements as said of one claim, and of several."""
+"""Verb of each judgement, for one claim and for several."""
 
 
 def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The figures of the thesis in its own arrangement, from a reproduction to plain data."""
+"""Draw the figures of the thesis in its own arrangement, from a reproduction."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MARKER = (
     "The marker is friso's evaluation point: crossover, friction, stiffness and masses as the thesis prints them; "
     "alpha, beta, path, stroke and limiter damping by friso's choice, since its own markers are not printed in numbers."
 )
-"""What stands below every map."""
+"""Note below every map."""
 
 _HUNTING = ("edge of the attracting cycle", VERMILLION)
 _PAIR = ("edge of asymmetric cycles at its basin", PINK)
@@ -113,7 +113,7 @@ def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
 
 
 def _response(reproduction: Reproduction) -> Figure:
-    """Position of the locked rig after the return move, with the counted peaks."""
+    """Draw the position of the locked rig after the return move, with the counted peaks."""
     response = reproduction.responses["locked"]
     trace = response.trace
     time = trace["time"].values
@@ -137,7 +137,7 @@ def _response(reproduction: Reproduction) -> Figure:
 
 
 def _shares(reproduction: Reproduction) -> Figure:
-    """P, I and D shares of the force on the locked rig, the wide gap above the narrow one."""
+    """Draw the P, I and D terms of the force on the locked rig, the wide gap above the narrow one."""
     panels = []
     for name in (WIDE, NARROW):
         trace = reproduction.responses[name].trace

@@ -47,7 +47,7 @@ OTHER_REASON = (
         "ode23s is the cheaper solver, but ode45 is not unstable: it costs more, and is right.",
     ),
 )  # fmt: skip
-"""What is right, but not for the reason that the thesis gives."""
+"""Remarks on statements that are right, but for another reason than the thesis gives."""
 
 SLIPS = (
     Remark(
@@ -69,7 +69,7 @@ SLIPS = (
         "A shorter stroke does not allow a stiffer joint: the force at full stroke does not set the limit.",
     ),
 )  # fmt: skip
-"""Where the text has a slip."""
+"""Remarks on slips in the text of the thesis."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
 
 
 def laws_rows(laws: ConclusionsByLaw) -> list[tuple[str, list[str]]]:
-    """For every claim, how it is judged under each law."""
+    """Return the judgement of every claim under each law, as table rows."""
     return [(c.claim.id, [_judgement_by_law(c, law) for law in laws.laws]) for c in laws.conclusions]
 
 
@@ -38,7 +38,7 @@ def _judgement_by_law(conclusion: ConclusionByLaw, law: str) -> str:
 
 
 def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
-    """For the JSON document."""
+    """Return the judgements under each law for the JSON document."""
     return {
         "laws": list(laws.laws),
         "left_out": {law: [SHOWN[kind] for kind in lost] for law, lost in laws.left_out.items()},

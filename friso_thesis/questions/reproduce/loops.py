@@ -66,7 +66,7 @@ def _free(loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]) -> Figure:
 def _of_loops(
     number: str, title: str, caption: str, loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]
 ) -> Figure:
-    """Magnitude and phase of the loops at every crossover, and beside them as the rig as built shows them."""
+    """Draw magnitude and phase of the loops at every crossover, of the model and of the rig as built."""
     ends = loops.omega[0] / (2 * np.pi), loops.omega[-1] / (2 * np.pi)
     of_model = [ResponseCurve(response, f"tuned to {tuned:g} Hz", "") for tuned, response in loops.curves.items()]
     columns = [_panels("model", ends, [(loops.omega / (2 * np.pi), curve) for curve in of_model])]
@@ -87,7 +87,10 @@ MEASURED_CAPTION = (
 
 
 def _panels(title: str, ends: tuple[float, float], curves: Sequence[tuple[np.ndarray, ResponseCurve]]) -> list[Panel]:
-    """Magnitude and phase of curves, all over as many frequencies [Hz], between the `ends` [Hz]."""
+    """Return panels of magnitude and phase of curves between the `ends` [Hz].
+
+    All curves have equally many frequencies [Hz].
+    """
     x = Axis("Frequency", "Hz", (float(ends[0]), float(ends[1])), log=True)
     shades = ramp(len(curves) + 1)  # its last shade is light
     responses = [curve.response for _, curve in curves]

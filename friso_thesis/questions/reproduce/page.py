@@ -1,4 +1,4 @@
-"""The page of `friso reproduce`, and its files."""
+"""Write the page of `friso reproduce`, and its files."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class ReproduceAnswer(Answer):
         return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
 
     def details(self) -> Sequence[str]:
-        """Every claim with its judgement, and the cycles behind the maps."""
+        """Return every claim with its judgement, and the cycles behind the maps."""
         claims = [
             f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
             for claim in self._document["claims"]
@@ -83,7 +83,7 @@ class ReproduceAnswer(Answer):
 
 
 def _drawn(space: dict[str, Any] | None) -> str:
-    """In how many joint draws a claim holds, where any were made."""
+    """Say in how many joint draws a claim holds; empty without draws."""
     return f"[{space['holds']} of {space['draws']} draws] " if space else ""
 
 

@@ -94,7 +94,7 @@ def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _plant(hertz: np.ndarray, above: tuple[Series, ...], below: tuple[Series, ...]) -> tuple[Panel, Panel]:
-    """Magnitude over phase of position over force."""
+    """Return panels of magnitude and phase of position over force."""
     axis = Axis.of_frequency(hertz)
     return (
         Panel("", axis, Axis("Magnitude", "m/N", log=True, prefixed=False), above),
@@ -268,4 +268,4 @@ _DRAWN: Mapping[str, Callable[[Experiments], dict[str, Figure]]] = {
     ON_RAILS: _cycles,
     STANDSTILL: _standstill,
 }
-"""What is drawn of an experiment."""
+"""Functions that draw an experiment, by its name."""

@@ -20,7 +20,7 @@ _COLUMNS = {"id": 0.05, "where": 0.105, "text": 0.22, "word": 0.71, "met": 0.80,
 _LETTERS = 84
 _TOP, _BOTTOM = 0.915, 0.035
 _BETWEEN = 0.6
-"""Space between two rows, in lines."""
+"""Space between two rows, in lines of text."""
 
 
 def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis.plausible import Plausible
 
 SHORT = 160
-"""Letters of a number in short."""
+"""Longest short form of a number, in letters."""
 
 AGREEMENT = {
     "holds": "agrees",
@@ -29,7 +29,7 @@ AGREEMENT = {
     "cannot be decided": "not decidable",
     "not yet covered": "not computed",
 }
-"""The judgements as the word of agreement."""
+"""Word of agreement for each judgement."""
 
 
 def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
@@ -59,7 +59,7 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """In how many draws it holds, and the interval of the share."""
+    """Say in how many draws a claim holds, with the interval of the fraction."""
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -68,7 +68,10 @@ def share(verdict: ClaimVerdict) -> str:
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
-    """In how many draws one of several criteria is met; empty of a single one, which the claim's own share tells."""
+    """Say in how many draws one of several criteria is met.
+
+    It is empty for a claim with one criterion, whose fraction is stated with the claim.
+    """
     space = verdict.space
     if space is None or len(space.parts) < 2:
         return ""

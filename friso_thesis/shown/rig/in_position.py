@@ -15,7 +15,7 @@ from friso_thesis.studies.rig.in_position import BITS, CASES, SETTLING, SOURCES,
 
 COLOURS = {"locked": VERMILLION, "free": BLUE}
 PARTS = (GREEN, ORANGE, GREY)
-"""Colours of the disturbances alone."""
+"""Colours of the single disturbances."""
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -69,7 +69,7 @@ def _after(result: InPosition) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Position over time, spectra, and RMS over the damping."""
+    """Draw position over time, spectra, and RMS over the damping."""
     result: InPosition = outcome.result
     return [_over_time(result), _spectra(result), _over_damping(result)]
 

@@ -25,7 +25,7 @@ from friso_thesis.studies.rig.measured_cycles import (
 
 AREA = "#cfdfee"
 LATE = 10.0
-"""From where the cycles are shown [s], as those that count."""
+"""Time [s] from which cycles are drawn and counted."""
 
 ASYMMETRY = "Difference of friction between the two sides"
 
@@ -144,7 +144,7 @@ def _other_changes(result: CycleComparison) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Fig. 27, the maps of the rails with a field, the cycles by their asymmetry, and the friction levels."""
+    """Draw Fig. 27, the maps of rails with a random field, cycles over asymmetry, and the friction levels."""
     result: CycleComparison = outcome.result
     if not result.even.swings[0]:
         return [_cycles(result)]
@@ -195,7 +195,7 @@ def _maps(result: CycleComparison) -> Figure:
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
-    """Medians over the last axis of what is known, NaN of nothing."""
+    """Return medians over the last axis, ignoring NaN; NaN where all are."""
     defined = np.asarray(np.isfinite(values).any(axis=-1))
     return np.where(defined, np.nanmedian(np.where(defined[..., None], values, 0.0), axis=-1), np.nan)
 

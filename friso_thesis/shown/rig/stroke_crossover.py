@@ -1,4 +1,4 @@
-"""What `friso rig stroke-crossover` shows: Fig. 26 of the thesis, in each cell the share of rails with peaks."""
+"""What `friso rig stroke-crossover` shows: Fig. 26 of the thesis, in each cell the fraction of rails with peaks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """From which crossover and stroke on no rail has counted peaks."""
+    """Say from which crossover and stroke on no rail has counted peaks."""
     counts: StrokeCrossover = outcome.result
     count, cells = len(counts.rails), counts.share
     shown = np.isfinite(cells) & (cells > 0)
@@ -65,7 +65,10 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def rails_panel(counts: StrokeCrossover) -> Panel:
-    """On how many rails peaks are counted: the fewer, the lighter, none in the colour of rest."""
+    """Return the map of the number of rails with counted peaks.
+
+    Lighter cells have fewer such rails; cells without any have the colour of rest.
+    """
     count = len(counts.rails)
     label, colours = f"Rails with counted peaks, of {count}", (QUIET, *ramp(count)[::-1])
     field = Map(counts.strokes, counts.crossovers, count * counts.share.T, label, "", colours=colours)

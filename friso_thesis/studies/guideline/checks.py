@@ -14,20 +14,24 @@ from friso_thesis.studies.guideline.persistence import DISTANCES, Begin, from_re
 from friso_thesis.studies.guideline.sweeps import Sweep
 
 BELOW, ABOVE = 0.9, 1.15
-"""Crossovers at which is simulated, as shares of the edge."""
+"""Crossovers of the check simulations, relative to the edge."""
 
 MOVES = 16
-"""Moves tried of each sample."""
+"""Number of moves tried for each sample."""
 
 SIZES, TIMES = (3.0, 300.0), (0.3, 3.0)
-"""Ranges of the moves: a t_acc^2 in units of the deflection by the break-away force, and t_acc over 1/omega_c; the
-thesis's is 90 and 1.5 at 8 Hz."""
+"""Ranges of the moves.
+
+The first is a t_acc^2 relative to the deflection by the break-away force; the second is t_acc times omega_c. The
+thesis's move has 90 and 1.5 at 8 Hz."""
 
 PERIODS = {BELOW: 200.0, ABOVE: 2000.0}
-"""Periods for which is simulated: above the edge transients of up to a thousand were seen."""
+"""Length of the check simulations in periods.
+
+Above the edge, transients of up to a thousand periods were seen."""
 
 APART = 20.0
-"""Periods of the crossover between the move there and the move back."""
+"""Time between the move there and the move back, in periods of the crossover."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ def _stuck(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
 
 
 def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
-    """Moves there and back, a Sobol sample of their sizes and times."""
+    """Return moves there and back whose sizes and times are a Sobol sample."""
     ends = np.log([SIZES, TIMES]).T
     size, time = np.exp(qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *ends)).T
     duration = np.tile(time, count) / crossover

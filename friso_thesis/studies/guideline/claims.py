@@ -21,19 +21,19 @@ FREE_EDGE, LOCKED_EDGES = (5.0, 5.5), (15.0, 14.3)
 """Crossovers [Hz] above which the thesis's rig no longer hunts, free and locked."""
 
 NEAR = 1.1
-"""Factor within which the free edge may be off the range, either way, and that of a short stroke above a long one's."""
+"""Ratio within which the free edge may miss its range, and a short stroke's edge may exceed a long one's."""
 
 GAP = (0.5, 2.0)
-"""Gaps [N] that are "about 1 N"."""
+"""Range of gaps [N] that counts as "about 1 N"."""
 
 STIFFNESSES = (1000, 2400)
 """Stiffnesses of the softer and of the stiffer joint [N/m]."""
 
 STROKES = (0.3, 1.0, 2.0)
-"""The stroke that is claimed to be enough, a long one and the longest [mm]."""
+"""Strokes [mm]: the one claimed to be enough, a long one, and the longest."""
 
 SAME = 0.02
-"""Share by which the edge differs at most where it "no longer changes"."""
+"""Largest relative change of an edge that "no longer changes"."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,10 @@ def _hertz(edge: float) -> str:
 
 @dataclass(frozen=True)
 class LeastGap:
-    """The friction gap [N] from which on a stage hunts lies between `low` and `high`; NaN: an edge is not known."""
+    """The least friction gap [N] with which a stage hunts: it lies between `low` and `high`.
+
+    NaN stands for an unknown edge.
+    """
 
     low: float
     high: float

@@ -39,20 +39,23 @@ from friso_thesis.studies.guideline.worked import Worked, friction_range, worked
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 SAMPLES = 512
-"""Default number of samples for the fit of the locked law; the other sweeps are shares of it."""
+"""Default number of samples for the fit of the locked law; the other sweeps are fractions of it."""
 
 FEWEST, MOST = 64, 65536
-"""Fewer samples do not determine the exponents of a law; more exceed what Sobol points gain here."""
+"""Smallest and largest number of samples.
+
+Fewer do not determine the exponents of a law; more bring no gain with Sobol points."""
 
 FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
-"""Samples with a free joint per one of a rigid mass, whose edge costs a tenth; and of their test per one of their
-fit."""
+"""Ratios of sample numbers: free joint to rigid mass, and test to fit.
+
+The edge of a rigid mass takes a tenth of the work."""
 
 CHECKED = 1 / 8
-"""Samples that are simulated, per one of the locked fit."""
+"""Ratio of simulated samples to samples of the locked fit."""
 
 RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
-"""Ratios of slip to drop that separate the bins for errors of the locked law."""
+"""Edges of the bins of the ratio of slip to drop, for errors of the locked law."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class Fit:
 
     @property
     def sweep(self) -> Sweep:
-        """Samples of fit and test."""
+        """Return the samples of fit and test together."""
         return concatenate_sweeps(self.fit, self.test)
 
     @property
@@ -85,7 +88,7 @@ class Fit:
 
     @property
     def again(self) -> int:
-        """Samples of fit and test in which a cycle attracts again above a crossover at which none does."""
+        """Return the number of samples in which a cycle attracts again above a crossover without attractor."""
         return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
@@ -108,7 +111,10 @@ class Guideline:
     resumed: int
 
     def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
-        """Errors of the laws on those held-out samples for which `which` is true, shape (count,); None of none."""
+        """Return the errors of a law on the held-out samples selected by `which`, shape (count,).
+
+        Returns None if no sample is selected.
+        """
         held = (self.free if free else self.locked).test.usable
         subset = held.take(which(held))
         locked = self.locked.law.edge(subset.values)
@@ -116,14 +122,16 @@ class Guideline:
         return Errors.between(law, subset.edge) if len(law) else None
 
     def held_out_by_rates(self) -> list[ByRates]:
-        """Errors of the locked law by the ratio of its two rates."""
+        """Return the errors of the locked law by the ratio of its two rates."""
         return by_rates(self.locked)
 
 
 @dataclass(frozen=True)
 class ByRates:
-    """Errors of the locked law on the held-out samples whose ratio of slip to drop is from `low` to below `high`; None
-    without such samples."""
+    """Errors of the locked law on held-out samples within one range of slip over drop.
+
+    The ratio is at least `low` and below `high`. The errors are None without samples.
+    """
 
     low: float
     high: float
@@ -131,7 +139,7 @@ class ByRates:
 
 
 def by_rates(locked: Fit) -> list[ByRates]:
-    """Errors of the locked law by the ratio of its two rates."""
+    """Return the errors of the locked law by the ratio of its two rates."""
     held = locked.test.usable
     ratio = _ratio(locked.law, held.values)
     decades = []
@@ -189,7 +197,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
 
 
 def checked_samples(samples: int) -> None:
-    """Raises InputError for a number of samples that does not do."""
+    """Check the number of samples. Raises InputError if it is too small or too large."""
     if not FEWEST <= samples <= MOST:
         raise InputError(
             "--samples", quoted(samples), f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}"
@@ -197,7 +205,7 @@ def checked_samples(samples: int) -> None:
 
 
 def group_counts() -> dict[str, Count]:
-    """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
+    """Return the numbers of parameters and groups for the rigid rig, with joint, and with parasitic mode."""
     return {
         "rigid": group_count(plain_rig()),
         "joint": group_count(plain_rig("joint")),
@@ -223,7 +231,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 
 
 def _compile() -> None:
-    """Compile all equations that are needed, side by side."""
+    """Compile all equations that are needed, in parallel."""
     flats = (plain_rig(), plain_rig("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
     kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 

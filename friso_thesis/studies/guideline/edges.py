@@ -19,21 +19,25 @@ OF = (
     "the symmetric cycle (of stages that are not symmetric, that over a whole period); others may attract beyond, and "
     "friso check looks for them"
 )
-"""What these edges are of."""
+"""Description of the cycle to which these edges belong."""
 
 ROUNDS = 6
-"""Bisections of the step of the grid that holds the edge."""
+"""Number of bisections of the grid step that contains the edge."""
 
 MEETS = 0.9, 1.1
-"""Sizes of the multiplier of one and the same cycle just below a flip, at least, and just above it, at most: the
-bracket of an edge is less than 1 % wide in the end."""
+"""Bounds of the multiplier's size below and above a flip.
+
+A multiplier beyond its bound belongs to another cycle. The final bracket of an edge is less than 1 % wide."""
 
 STEP, STEPS = 1.02, 16
-"""Where a cycle is replaced by another, the factor by which is gone upward as long as simulations hunt, and how often
-at most: as far as the next crossover of a sweep's grid."""
+"""Factor and largest number of upward steps in crossover after another cycle takes over.
+
+The steps continue while simulations hunt, at most to the next crossover of the grid."""
 
 LONG = 2000.0
-"""Periods of a small cycle for which is simulated there: transients may be long beside a cycle that repels."""
+"""Length of simulations of small cycles, in their periods.
+
+Transients near an unstable cycle may be long."""
 
 FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
 BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
@@ -47,10 +51,10 @@ KINDS = {
     ABOVE: "a cycle attracts up to the highest crossover tried",
     UNKNOWN: "a decisive simulation failed, or after a jump hunting did not end within the steps allowed",
 }
-"""Kinds of an edge, and of stages without one in the range."""
+"""Kinds of edges in words, and reasons why a stage has none in the range."""
 
 Stages = Callable[[np.ndarray, np.ndarray], Ensemble]
-"""Stages from their numbers and crossovers, both of shape (count,)."""
+"""Function that makes stages from their numbers and crossovers, both of shape (count,)."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,7 @@ class _Search:
         self.failed = (beyond & at_crossovers.failed[which]).any(axis=1)
 
     def halve(self) -> None:
-        """Halve the step behind the last crossover at which a cycle attracts."""
+        """Halve the step above the last crossover at which a cycle attracts."""
         middle = (self.low + self.high) / 2
         at_crossovers = _at_crossovers(self.stages, self.which, np.exp(middle))
         inside, flips = at_crossovers.attracts, ~at_crossovers.attracts & np.isfinite(at_crossovers.multiplier)
@@ -193,7 +197,7 @@ class _Search:
         return np.isfinite(self.outside) & ~meets
 
     def follow(self) -> None:
-        """Go on upward from jumps as long as simulations hunt."""
+        """Continue upward from jumps while simulations hunt."""
         jumping = np.flatnonzero(self.jumps)
         for _ in range(STEPS):
             if not jumping.size:

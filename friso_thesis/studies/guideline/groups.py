@@ -22,14 +22,18 @@ from friso.quantities import Quantity
 from friso.stage import numeric_keys
 
 LIMITER_OVER_BRISTLES = 200.0
-"""Limiter over bristle stiffness of the thesis rig (2e7 over 1e5 N/m, Table 2), so stiff that it hardly matters."""
+"""Ratio of limiter to bristle stiffness of the thesis rig (2e7 to 1e5 N/m, Table 2).
+
+It is so large that its value hardly matters."""
 
 
 EXPONENT = 2.0
-"""The Stribeck exponent, itself a group, of all sweeps: that of the thesis (Table 2)."""
+"""Stribeck exponent of all sweeps, which is a group by itself: that of the thesis (Table 2)."""
 
 RIGID_SHARE = 0.3
-"""Share of the stage in a mass that moves as one: without effect, the equations know the sum alone."""
+"""Fraction of a rigid mass that is declared as the stage.
+
+It has no effect: the equations contain the sum only."""
 
 
 @dataclass(frozen=True)
@@ -148,10 +152,10 @@ GROUPS: Mapping[str, Group] = {
 }
 
 _TELLING = {"joint": "joint.stiffness", "parasitic": "parasitic.frequency"}
-"""A key that stages have where the part described by a group exists."""
+"""Key that shows, for each part of the stage, that the part exists."""
 
 GroupValues = Mapping[str, Any]
-"""Numbers, or arrays of one shape, by the name of their group."""
+"""Values of groups by name: numbers, or arrays of one shape."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +168,7 @@ class GroupScale:
 
     @property
     def rate(self) -> float:
-        """Frequency of the mass on its bristles [rad/s], in which the crossover is measured."""
+        """Return the natural frequency of the mass on its bristles [rad/s], the unit of the crossover."""
         return float(np.sqrt(self.stiffness / self.mass))
 
 
@@ -193,7 +197,7 @@ def group_parameters(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def dimensions(name: str, flat: Mapping[str, Any]) -> np.ndarray:
-    """Powers of kg, m and s in the unit of a parameter, shape (3,)."""
+    """Return the powers of kg, m and s in the unit of a parameter, shape (3,)."""
     field = numeric_keys(flat)[PARAMETERS[name].keys[0]]
     return np.array(_powers(field.unit if isinstance(field, Quantity) else ""))
 
@@ -228,9 +232,10 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flat_of(values: GroupValues, scale: GroupScale = _UNIT) -> dict[str, Any]:
-    """Flat keys to SI values of stages with these groups: rigid, or with a joint that is free if `joint` is among them.
+    """Return flat keys of stages with given groups, in SI; the inverse of `values_of`.
 
-    The inverse of `values_of`; `scale` decides on what the groups leave open.
+    The stages are rigid, or have a free joint if `joint` is among the groups. `scale` sets the units that groups leave
+    open.
     """
     mass, stiffness, force = scale.mass, scale.stiffness, scale.force
     impedance = np.sqrt(stiffness * mass)

@@ -34,13 +34,16 @@ REFERENCE: Mapping[str, float] = {
     "joint_damping": 0.01,
     "limiter_damping": 0.05,
 }
-"""Values of the groups at which their powers are 1, round numbers near the thesis rig."""
+"""Values of the groups that serve as references in the laws: round numbers near the thesis rig."""
 
 SCALE = 0.1
-"""Error of the logarithm from which on the loss grows linearly instead of with the square."""
+"""Error of the logarithm above which the loss grows linearly instead of quadratically."""
 
 FOLDS, GAIN, MOST = 8, 0.02, 8
-"""Parts of the cross-validation, share by which an exponent has to lower its loss, and exponents at most."""
+"""Settings of the cross-validation.
+
+They are the number of parts, the relative loss that a further exponent has to save, and the largest number of
+exponents."""
 
 SampleValues = Mapping[str, np.ndarray]
 
@@ -63,8 +66,10 @@ class Rate:
 
 
 Combine = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""From the logarithms of the rates, shape (rates, count), and of the locked edge, (count,), to that of the edge and its
-derivative by those of the rates."""
+"""Function that combines rates into an edge.
+
+It takes the logarithms of the rates, shape (rates, count), and of the locked edge, (count,). It returns the logarithm
+of the edge and its derivatives with respect to those of the rates."""
 
 Exponent = tuple[int, str]
 """The number of a rate and a group."""
@@ -97,7 +102,7 @@ class FittedLaw:
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
     def log_rates(self, values: SampleValues) -> np.ndarray:
-        """Logarithms of the rates, shape (rates, count)."""
+        """Return the logarithms of the rates, shape (rates, count)."""
         parameters = np.array([*np.log(self.factors), *self.exponents.values()])
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
@@ -127,8 +132,10 @@ class Errors:
 
     @classmethod
     def between(cls, law: np.ndarray, edges: np.ndarray) -> Errors:
-        """Errors of the edges by a law against those found, both (count,); `safe` is the factor on the law below which
-        95 % of the edges lie."""
+        """Return the errors of a law against the edges found, both of shape (count,).
+
+        `safe` is the factor on the law below which 95 % of the edges lie.
+        """
         off = np.log(edges / law)
         size = np.abs(off)
         return cls(
@@ -144,13 +151,13 @@ class Errors:
 
 
 def rates_in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slownesses add: edge^-power is the sum of rate^-power."""
+    """Combine rates whose slownesses add: edge^-power is the sum of rate^-power."""
     total = np.logaddexp.reduce(-power * rates, axis=0)
     return -total / power, np.exp(-power * rates - total)
 
 
 def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """edge^-2 is that of the locked edge plus that of the largest rate."""
+    """Combine the locked edge and the largest rate: edge^-2 is the sum of both to the power -2."""
     largest = rates.argmax(axis=0)
     log, weights = rates_in_series(2.0, np.stack([rates.max(axis=0), locked]), locked)
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
@@ -177,7 +184,7 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
 
 
 def loss(off: np.ndarray) -> float:
-    """Size of errors of the logarithm: their rms, were all small; beyond `SCALE` they count linearly."""
+    """Return the size of errors of the logarithm: their rms if small; beyond `SCALE` they count linearly."""
     return float(np.sqrt(np.mean(2 * SCALE**2 * (np.sqrt(1 + (off / SCALE) ** 2) - 1))))
 
 
@@ -202,7 +209,7 @@ def _validated(
 def _log_coefficients(
     law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
-    """Logarithms of the factors, then the exponents."""
+    """Return the logarithms of the factors, followed by the exponents."""
     features = _features(law, chosen, values)
     fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])
 
@@ -218,7 +225,7 @@ def _log_coefficients(
 
 
 def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues) -> np.ndarray:
-    """Derivatives of the logarithms of the rates by the parameters, shape (rates, parameters, count)."""
+    """Return derivatives of the logarithms of the rates, shape (rates, parameters, count)."""
     count, rates = len(next(iter(values.values()))), len(law.rates)
     features = np.zeros((rates, rates + len(chosen), count))
     features[np.arange(rates), np.arange(rates)] = 1.0
@@ -241,16 +248,16 @@ _FRICTION = ("gap", "bristle_damping", "viscous")
 _JOINT = ("stage_share", "joint_damping", "limiter_damping", "stribeck")
 
 SLIP = Rate("slip", {"stribeck": 1.0, "gap": 1.0}, (*_TUNING, *_FRICTION))
-"""sigma_0 v_s/F_s"""
+"""The rate sigma_0 v_s/F_s."""
 
 DROP = Rate("drop", {"stribeck": -1.0}, (*_TUNING, *_FRICTION))
-"""(F_s - F_c)/(m v_s)"""
+"""The rate (F_s - F_c)/(m v_s)."""
 
 JOINT = Rate("joint", {"joint": 0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""sqrt(k_j/m)"""
+"""The rate sqrt(k_j/m)."""
 
 STROKE = Rate("stroke", {"joint": 0.5, "stroke": -0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""sqrt(F_s/(m S_j))"""
+"""The rate sqrt(F_s/(m S_j))."""
 
 LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(rates_in_series, 1.0))
 FREE_LAW = EdgeLaw((JOINT, STROKE), beside_locked)

@@ -14,13 +14,13 @@ from friso.frequency.ranges import Range
 from friso.stage import Stage
 
 FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)
-"""Parasitic modes [Hz]."""
+"""Frequencies of parasitic modes [Hz]."""
 
 DAMPING_RATIOS = (0.01, 0.001)
-"""Damping ratios of the mode: of the rig's stage file, and of leaf springs without anything that damps them."""
+"""Damping ratios of the mode: that of the rig's stage file, and that of bare leaf springs."""
 
 DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
-"""The sampling of the thesis's drive (Sec. 3.5), and a sample of delay."""
+"""Sample time of the thesis's drive (Sec. 3.5), and a delay of one sample."""
 
 
 @dataclass(frozen=True)

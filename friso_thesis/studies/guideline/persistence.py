@@ -19,23 +19,27 @@ from friso.hunting.criteria import lasts
 from friso.hunting.measures import swing_of
 
 DISTANCES = np.geomspace(0.02, 2.0, 95)
-"""Start distances, in deflections of the loop by the break-away force: 5 % apart, about every cycle, whose own distance
-is 0.03 (at the smallest friction gaps) to 1.5 of them."""
+"""Start distances, relative to the loop's deflection by the break-away force, 5 % apart.
+
+Cycles have distances from 0.03, at the smallest friction gaps, to 1.5."""
 
 SMALL = 0.005
-"""Band about the reference, in the same units, within which a motion rests: the smallest cycles of the sweeps, those of
-the smallest friction gaps, swing by 0.06 from peak to peak and more."""
+"""Band around the reference within which a motion counts as resting, in units of the same deflection.
+
+The smallest cycles of the sweeps swing by at least 0.06 from peak to peak."""
 
 SLOW = 0.05
-"""Distance, in the same units, whose cycle tells how long is simulated: a stage waits the longer the nearer it sticks,
-so that the periods of small cycles are the longest."""
+"""Distance whose cycle sets the length of simulations, in units of the deflection by the break-away force.
+
+Small cycles have the longest periods, because a stage sticks longer near its reference."""
 
 PERIODS, LAST = 200.0, 2.0
-"""Periods of such a cycle for which is simulated unless told, and those at the end in which the stage is looked at.
-Beside a cycle that repels by 1 % per half a period a deviation grows 50 times in them."""
+"""Default length of simulations, and length of the judged end, in periods of the cycle at `SLOW`.
+
+Near a cycle that repels by 1 % per half period, a deviation grows 50 times within the first."""
 
 RTOL = 1e-6
-"""Relative tolerance of these runs."""
+"""Relative tolerance of the simulations."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +52,7 @@ class Begin:
 
 
 def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
-    """Stuck at distances (count,), in units of the deflection by the break-away force."""
+    """Return a start at rest, stuck at distances (count,) in units of the deflection by the break-away force."""
     return Begin({"motion.displacement": stages.length}, stuck(stages, distances * stages.length))
 
 

@@ -17,10 +17,10 @@ from friso_thesis.studies.kept_work import KeptWork
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
 
 STEPS = {LOCKED: 1, FREE: 8}
-"""Steps of the progress that a sample counts: one with a free joint takes as long as eight rigid masses."""
+"""Steps of progress per sample: one with a free joint takes as long as eight rigid masses."""
 
 Box = Mapping[str, tuple[float, float]]
-"""The range of each group from which it is drawn, evenly in the logarithm."""
+"""Range of each group; samples are uniform in its logarithm."""
 
 LOCKED_BOX: Box = {
     "gap": (0.1, 0.85),
@@ -51,10 +51,10 @@ FREE_GRID = np.geomspace(0.03, 1.6, 12)
 """Crossovers tried with a free joint, in units of the locked edge."""
 
 PART = 32
-"""Samples that are worked on together, and kept when they are done."""
+"""Number of samples that are computed and saved together."""
 
 LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
-"""Seeds of the scrambled Sobol sequences: fits and their tests share no sample."""
+"""Seeds of the scrambled Sobol sequences; fits and tests have separate samples."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def usable(self) -> Sweep:
-        """Return those with an edge in the range."""
+        """Return the samples with an edge in the range."""
         return self.take(self.edges.located)
 
 
@@ -92,7 +92,7 @@ def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
 
 
 class Keep(KeptWork):
-    """Folder in which the parts of sweeps are kept until all are done."""
+    """Folder in which finished parts of sweeps are saved until all are done."""
 
     sources = ("../friso_thesis/studies/guideline",)
 
@@ -107,7 +107,7 @@ def _columns(edges: Edges) -> dict[str, np.ndarray]:
 
 
 def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
-    """Sobol samples of a box, by group, each of shape (count,)."""
+    """Return Sobol samples of a box, by group, each of shape (count,)."""
     points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(np.array(list(box.values()))).T
     return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))

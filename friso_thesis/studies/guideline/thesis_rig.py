@@ -21,7 +21,7 @@ FREE_GRID = np.geomspace(1.0, 20.0, 28)
 """Crossovers tried for the rig [Hz]; the more with a free joint, some of whose cycles cannot be closed."""
 
 RigChanges = Mapping[str, Any]
-"""Keys that differ from those of the rig, SI."""
+"""Keys that differ from those of the rig, with SI values."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ThesisCase:
 
 @dataclass(frozen=True)
 class Laws:
-    """The two laws that give the edge of any stage."""
+    """The two laws that together give the edge of any stage."""
 
     locked: FittedLaw
     free: FittedLaw

@@ -27,7 +27,7 @@ LIMITS = (8.0, 48.0)
 was stable on its rig (Sec. 4.3.1)."""
 
 AMPLE = 1.0
-"""A stroke [m] that no cycle uses up."""
+"""Stroke [m] that exceeds every cycle."""
 
 CLAIMED_AT = 8.0
 """Crossover [Hz] of the thesis's studies (Sec. 3.4.2)."""
@@ -41,7 +41,7 @@ STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
     "stroke": lambda changes: changes["joint.stroke"],
     "parasitic": lambda changes: changes["parasitic.frequency"],
 }
-"""Value that each study varies, SI, from the changes of a case."""
+"""Functions that return the varied value [SI] of each study, from the changes of a case."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class WorkedDesign:
 
     @property
     def unknown(self) -> int:
-        """Pairs of friction forces whose edge could not be computed."""
+        """Return the number of pairs of friction forces whose edge could not be computed."""
         return int(np.isnan([case.ranked for case in self.cases]).sum())
 
     @property
@@ -220,13 +220,13 @@ DESIGN_GAPS = (0.3, 0.6, 0.85)
 """Friction gaps over which a design is computed."""
 
 CORRECTED, CLOSER = 5, 0.98
-"""Designs at most, that by the law included, and the factor on each new aim, with which fewer are needed."""
+"""Largest number of designs, including that by the law, and safety factor on each new aim."""
 
 BLIND = 0.85
 """Factor on the new aim where an edge is unknown."""
 
 MARGIN = 0.9
-"""Share of the stiffest joint that is chosen: at all of it only an endless stroke would do."""
+"""Chosen stiffness of the joint relative to the stiffest allowed, which would need an endless stroke."""
 
 
 def _root(function: Any, low: float, high: float) -> float:
@@ -234,7 +234,7 @@ def _root(function: Any, low: float, high: float) -> float:
 
 
 def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
-    """Changes of the rig by the name of the study, and whether its joint is free."""
+    """Return the changes of the rig by study, and whether its joint is free."""
     flat = plain_rig("joint")
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
     forces = [

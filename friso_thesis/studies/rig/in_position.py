@@ -22,13 +22,13 @@ from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
 
 FASTER = 2.0
-"""Crossover over that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""
+"""Raised crossover relative to that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""
 
 SETTLING, WATCHED = 4.0, 12.0
-"""Time [s] before the stage is watched, and for which it is."""
+"""Settling time before the record [s], and length of the record [s]."""
 
 INTERVAL = 5e-4
-"""Between the samples, at most [s]."""
+"""Largest time between samples [s]."""
 
 BITS = 14
 """Resolution of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its
@@ -45,7 +45,7 @@ DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Damping ratios of the joint with the stage's mass, our choice."""
 
 SEGMENTS = 6
-"""Into which what is watched is cut for its spectrum."""
+"""Number of segments of the record for its spectrum."""
 
 CASES = {"locked": True, "free": False}
 SOURCES = ("encoder", "amplifier", "floor", "all")
@@ -85,12 +85,12 @@ class InPosition:
     louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
 
     def ratio(self, source: str) -> float:
-        """RMS with the joint free over that with it locked."""
+        """Return the RMS with the joint free relative to that with it locked."""
         return float(self.runs["free", source].true[0, 0] / self.runs["locked", source].true[0, 0])
 
     @property
     def recovered(self) -> np.ndarray:
-        """By damping the share of the difference in RMS between the joint free and locked that it takes away."""
+        """Return how much of the difference in RMS between free and locked each damping recovers, as a fraction."""
         locked, free = (self.runs[case, "all"].true[0, 0] for case in CASES)
         return (free - self.damped.true[:, 0]) / (free - locked)
 
@@ -161,7 +161,7 @@ def in_position(
 
 
 def amplifier_noise(stage: Stage) -> float:
-    """RMS [N] of the noise of the drive's force: that of rounding to `BITS` between its limits."""
+    """Return the RMS [N] of the drive's force noise: that of rounding to `BITS` between its limits."""
     flat = stage.flat()
     limit = flat.get(FORCE_LIMIT, LIMIT_FACTOR * flat.get("friction.static", 1.0))
     return float(2 * limit / 2**BITS / np.sqrt(12))
@@ -192,7 +192,7 @@ def _recorded(
 
 
 def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
-    """Time [s] and deviation of the true position from the reference [m] of the first run, once watched."""
+    """Return time [s] and true deviation from the reference [m] of the first run, from the start of the record."""
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]
@@ -208,7 +208,7 @@ def _standstill(recorded: RecordedRuns, since: float) -> Standstill:
 
 
 def segment(step: float) -> int:
-    """Samples in a segment of the spectrum, for so much time between them [s]; segments overlap by half."""
+    """Return the number of samples per segment of the spectrum, for a sample time [s]; segments overlap by half."""
     return 2 * int(WATCHED / step / (SEGMENTS + 1))
 
 

@@ -38,37 +38,41 @@ from friso.studies.rig.outcome import Outcome, rig_log
 from friso.virtual_rig.task import MoveTask
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
-"""Standard deviations of static and of Coulomb friction, over their means: our choice."""
+"""Relative standard deviations of static and of Coulomb friction: our choice."""
 
 LENGTHS = (2.0, 5.0, 10.0, 20.0)
-"""Correlation lengths over the swing of the cycle on an even rail: our choice."""
+"""Correlation lengths relative to the swing of the cycle on an even rail: our choice."""
 
 HARMONICS = (0.01, 0.02, 0.05, 0.1)
-"""Amplitudes of the harmonic of the rolling elements, over the mean: our choice."""
+"""Amplitudes of the rolling elements' harmonic, relative to mean friction: our choice."""
 
 PITCH = 4.0
-"""Pitch of the rolling elements over that swing, for a stage that states none."""
+"""Pitch of the rolling elements relative to the swing on an even rail, for a stage that states none."""
 
 STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
-"""Friction levels over those of the stage, on an even rail: our choice."""
+"""Static and Coulomb friction relative to those of the stage, on an even rail: our choice."""
 
 STARTS = (0.0, 0.005, 0.01, 0.02)
-"""Starts of a cycle: the move (0), or a release from this share of its distance."""
+"""Starts of a cycle: the move (0), or a release from a fraction of its distance."""
 
 LONGER = 1.5
-"""Over the time of other runs: slow cycles shall come often enough."""
+"""Length of these runs relative to others, so that slow cycles occur often enough."""
 
 MASS_FACTOR = 1.47
-"""Mass of the mass line over the weighed mass (Sec. 4.2.1)."""
+"""Mass read from the mass line relative to the weighed mass (Sec. 4.2.1)."""
 
 MOTORS = (1.0, 1 / MASS_FACTOR)
-"""Motor constants over the stage's: the weaker one would show the measured mass line for the weighed mass."""
+"""Motor constants relative to the stage's.
+
+With the weaker one, the weighed mass would show the measured mass line."""
 
 AS_SLOW, SIMILAR = 1.8, 1.5
-"""Period over that of the even rail from which it is "nearly twice", and factor within which swings are "similar"."""
+"""Thresholds of periods and swings relative to the even rail.
+
+A period from the first on is "nearly twice"; swings within the second factor are "similar"."""
 
 BINS = (0.0, 0.01, 0.02, 0.03, 0.05, 0.1, np.inf)
-"""Edges of the asymmetry of friction."""
+"""Edges of the bins of asymmetry of friction."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +105,11 @@ class CycleComparison:
     slowest: tuple[float, float, float] | None
 
     def slower(self, runs: RailRuns) -> np.ndarray:
-        """Periods over that of the even rail, NaN of runs that do not swing at their end."""
+        """Return periods relative to that of the even rail; NaN for runs that do not swing at their end."""
         return np.where(runs.swings, runs.period, np.nan) / self.even.period[0]
 
     def larger(self, runs: RailRuns) -> np.ndarray:
-        """Swings over that of the even rail, NaN of runs that do not swing at their end."""
+        """Return swings relative to that of the even rail; NaN for runs that do not swing at their end."""
         return np.where(runs.swings, runs.swing, np.nan) / self.even.swing[0]
 
     def as_measured(self, runs: RailRuns) -> np.ndarray:
@@ -115,7 +119,7 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the share that still swings
+        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the fraction that still swings
         when the run ends, and the median of the periods over that of the even rail."""
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):
@@ -209,7 +213,10 @@ def moves_on_varied_rails(
     progress: Progress,
     label: str,
 ) -> tuple[RailRuns, np.ndarray]:
-    """Moves on all rails of all cases, shape (cases * rails,), and the asymmetry of friction about their targets."""
+    """Return the moves on all rails of all cases, and the asymmetry of friction around their targets.
+
+    Runs and asymmetries have the shape (cases * rails,).
+    """
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     changes["rail.seed"] = np.tile(seeds, count)
@@ -221,8 +228,10 @@ def moves_on_varied_rails(
 
 
 def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
-    """Cycles with other motors and friction levels, shape (motors, static, coulomb); static friction is at least as
-    large as Coulomb friction."""
+    """Return cycles with other motors and friction levels, shape (motors, static, coulomb).
+
+    Static friction is at least as large as Coulomb friction.
+    """
     flat = stage.flat()
     motor, first, second = (axis.ravel() for axis in np.meshgrid(MOTORS, STATIC, COULOMB, indexing="ij"))
     coulomb = second * flat["friction.coulomb"]
@@ -233,7 +242,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
 
 
 def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
-    """Cycles with one thing changed, by its name."""
+    """Return cycles with one property changed, by its name."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}

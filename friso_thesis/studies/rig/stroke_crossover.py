@@ -1,4 +1,4 @@
-"""On which share of rails peaks are counted, over stroke and crossover.
+"""On which fraction of rails peaks are counted, over stroke and crossover.
 
 Thesis, Fig. 26.
 """
@@ -26,10 +26,12 @@ from friso.studies.rig.moves_on_rails import (
 from friso.studies.rig.outcome import Outcome, rig_log
 
 CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
-"""Over that of the stage: the thesis's range for its rig (Table 3, Fig. 16), the steps ours."""
+"""Crossovers relative to that of the stage.
+
+The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our choice."""
 
 STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
-"""Over that of the stage: up to 1 mm in Table 3; the steps ours."""
+"""Strokes relative to that of the stage: up to 1 mm in Table 3; the steps are our choice."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class StrokeCrossover:
 
     @property
     def share(self) -> np.ndarray:
-        """Return the share of rails on which peaks are counted, shape (strokes, crossovers);
+        """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers);
         NaN where all runs failed."""
         done = ~self.runs.failed
         count = done.sum(axis=2)
@@ -56,7 +58,7 @@ class StrokeCrossover:
 
     @property
     def nearest(self) -> int:
-        """Number of the crossover that is the stage's, or the next to it."""
+        """Return the index of the crossover nearest to the stage's own."""
         return int(np.argmin(abs(self.crossovers - self.frequency)))
 
     @property

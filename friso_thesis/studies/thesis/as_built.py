@@ -70,18 +70,19 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
 thesis_drive.toml, with which `friso rig` runs the same experiments."""
 
 COULOMB_LEVEL = 2.0
-"""Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of
-`friso rig measured-cycles`."""
+"""Coulomb friction relative to that of the rig, with the weaker motor.
+
+It is our choice among the levels of `friso rig measured-cycles`."""
 
 SEED = 1
 RAILS = 20
-"""Seed, and number, of the moves and of the rails that vary."""
+"""Seed and number of the moves and of the varied rails."""
 
 CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
-"""Over 8 Hz (Sec. 4.3.2)."""
+"""Crossovers relative to 8 Hz (Sec. 4.3.2)."""
 
 DISPLACEMENTS = (-0.05, 0.05)
-"""Displacements of the releases over the distance of the move: 5 mm to either side."""
+"""Displacements of the releases relative to the distance of the move: 5 mm to either side."""
 
 STROKES, LOOPS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
 """Strokes over that of the rig and crossovers over 8 Hz of Fig. 26; each cell has `RAILS`."""
@@ -146,13 +147,13 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Fig. 26: strokes and crossovers, on all rails."""
+    """Return moves over strokes and crossovers on all rails (Fig. 26)."""
     seeds = 1.0 + np.arange(float(RAILS))
     return stroke_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
 
 def cycles(stage: Stage) -> CyclesOnRails:
-    """Fig. 27: an even rail and rails that vary, the joint locked."""
+    """Return cycles on an even rail and on varied rails, the joint locked (Fig. 27)."""
     machine = _prescribed(stage)
     even = on_rail(with_joint(machine, locked=True))
     run = started(even, SEED, {}, 1, silent, "")
@@ -171,7 +172,7 @@ _FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("
 
 
 def standstill(stage: Stage) -> InPosition:
-    """Fig. 28."""
+    """Return the rig at a standstill under each disturbance (Fig. 28)."""
     return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
 
 
@@ -190,7 +191,7 @@ class RailTraces:
 
 
 def traces(stage: Stage, rail: int) -> RailTraces:
-    """Fig. 24, 25 and 27 in time, on the rail of a number from 0 on."""
+    """Return logs of single moves on a rail, chosen by its number from 0 (Fig. 24, 25 and 27)."""
     machine = _prescribed(stage)
     frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
     held, loose = (with_joint(machine, locked) for locked in (True, False))

@@ -33,9 +33,9 @@ class Claim:
     text: str
     section: str
     quotes: tuple[str, ...]
-    """What the thesis says, in its own words."""
+    """Words of the thesis that state the claim."""
     listed: bool = True
-    """Whether it is in the list of claims that the project began with; others were found by reading on."""
+    """Whether the project's first list of claims contains it; other claims were found later."""
 
     @property
     def place(self) -> tuple[int, ...]:

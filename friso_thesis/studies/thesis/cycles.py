@@ -24,13 +24,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SURVEYED = 14
-"""The stage is surveyed at about so many values of each axis: a cell takes a hundred runs."""
+"""Approximate number of values per axis at which the stage is surveyed; a cell takes a hundred runs."""
 
 NODES = 9
-"""Stages along either axis from which curves are looked for."""
+"""Number of stages along either axis from which curves are searched."""
 
 SMALLEST = 1e-3
-"""Share of a linear range at which curves begin that would begin at zero, where there may be no stage."""
+"""Start of curves on a linear range that begins at zero, as a fraction of the range.
+
+There may be no stage at zero."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: K
 
 
 def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
-    """Edges as arrays by number and name."""
+    """Return edges as arrays by number and name."""
     return {f"{n}.{key}": np.asarray(value) for n, edge in enumerate(edges) for key, value in vars(edge).items()}
 
 

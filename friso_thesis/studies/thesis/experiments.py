@@ -50,11 +50,11 @@ FORCE = 5.0
 that it finds."""
 
 RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
-"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the share of it
+"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the fraction of it
 that is Coulomb friction (as in Table 2): number and share are our choice."""
 
 FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
-"""[Hz], at which the response with friction is computed."""
+"""Frequencies [Hz] of the response with friction."""
 
 SAMPLE_TIME = 1e-3
 """Sample time of the records [s]: the thesis gives none."""
@@ -69,7 +69,7 @@ SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
 """Speeds of slow motion [m/s] and their time [s]: the thesis gives neither; up to the slower one of Fig. 21."""
 
 STROKE = "8 mm"
-"""The limiters in the identification (Sec. 4.2.1)."""
+"""Stroke to the limiters during identification (Sec. 4.2.1)."""
 
 
 @dataclass(frozen=True)
@@ -117,16 +117,16 @@ class ConstantSpeed:
 
 
 LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
-"""The experiments by name, as a judge needs them."""
+"""Names of the experiments, by which judges request them."""
 
 BUILT = "rig_loops"
-"""Loops and plants of the rig as built (Sec. 4.2)."""
+"""Name of the loops and plants of the rig as built (Sec. 4.2)."""
 
 MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
-"""Experiments with the rig as built (Sec. 4.3.2): moves, their maps, and standstill."""
+"""Names of the experiments with the rig as built (Sec. 4.3.2): moves, their maps, cycles, and standstill."""
 
 TRACES = "traces"
-"""Single moves of the rig as built, which are shown and not judged."""
+"""Name of the single moves of the rig as built, which are shown but not judged."""
 
 EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
     {
@@ -141,7 +141,7 @@ EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
         STANDSTILL: PartNeeded(("motion.",)),
     }
 )
-"""What of the stage file plays no part: the first is without its controller, and all have motions of their own."""
+"""Experiments, with the tables of the stage file that do not matter for each."""
 
 
 class Experiments:
@@ -154,52 +154,52 @@ class Experiments:
 
     @property
     def locked_line(self) -> LockedLine:
-        """Fig. 17."""
+        """Return the identification of the locked rig (Fig. 17)."""
         return self._result(LINE)
 
     @property
     def joint_steps(self) -> JointSteps:
-        """Fig. 19."""
+        """Return the position steps of the joint (Fig. 19)."""
         return self._result(STEPPED)
 
     @property
     def slow_motion(self) -> tuple[SlowMotion, ...]:
-        """Fig. 20."""
+        """Return the slow motion at several speeds (Fig. 20)."""
         return self._result(SLIPS)
 
     @property
     def constant_speed(self) -> tuple[ConstantSpeed, ConstantSpeed]:
-        """Fig. 21."""
+        """Return the motion at constant speed with the joint free and locked (Fig. 21)."""
         return self._result(SPEEDY)
 
     @property
     def rig_loops(self) -> RigLoops:
-        """Fig. 17, 18, 22, 23."""
+        """Return loops and plants of the rig as built (Fig. 17, 18, 22, 23)."""
         return self._result(BUILT)
 
     @property
     def moves(self) -> MovesOnRails:
-        """Fig. 24, 25."""
+        """Return moves on several rails (Fig. 24, 25)."""
         return self._result(MOVES)
 
     @property
     def grid(self) -> StrokeCrossover:
-        """Fig. 26."""
+        """Return moves over strokes and crossovers (Fig. 26)."""
         return self._result(GRID)
 
     @property
     def cycles(self) -> CyclesOnRails:
-        """Fig. 27."""
+        """Return cycles on even and varied rails (Fig. 27)."""
         return self._result(ON_RAILS)
 
     @property
     def standstill(self) -> InPosition:
-        """Fig. 28."""
+        """Return the rig at a standstill (Fig. 28)."""
         return self._result(STANDSTILL)
 
     @property
     def traces(self) -> RailTraces:
-        """Fig. 24, 25, 27 in time."""
+        """Return logs of single moves (Fig. 24, 25, 27)."""
         return self._result(TRACES)
 
     def _result(self, name: str) -> Any:
@@ -212,7 +212,7 @@ class Experiments:
 
 @lru_cache(maxsize=64)
 def _experiment(name: str, stage_file: str) -> Any:
-    """Cached, since judges of several claims ask for the same."""
+    """Return an experiment, cached for the judges of several claims."""
     return _RUNS[name](loads(stage_file))
 
 
@@ -226,8 +226,10 @@ def locked_line(stage: Stage) -> LockedLine:
 
 
 def joint_steps(stage: Stage) -> JointSteps:
-    """Position steps of 0.3 mm with the cart fixed. The limiter is not touched, so the rig is linear, and the response
-    to all steps is the sum of those to each."""
+    """Simulate position steps of 0.3 mm with the cart fixed.
+
+    The limiter is not touched, so the rig is linear. The response to all steps is the sum of the responses to each.
+    """
     fixed = stage.replace({"masses.cart": FIXED_CART, "joint.stroke": STROKE, "joint.locked": False})
     duration = STANDS * (len(STEPS) + 1)
     run = simulate(
@@ -244,7 +246,7 @@ def joint_steps(stage: Stage) -> JointSteps:
 
 
 def slow_motion(stage: Stage, speed: float) -> SlowMotion:
-    """Slow motion at a `speed` [m/s] with the joint free, which sticks and slips; read with the joint's stiffness."""
+    """Simulate stick-slip at a `speed` [m/s] with the joint free, and analyse it with the joint's stiffness."""
     free = stage.replace({"joint.stroke": STROKE, "joint.locked": False})
     log = _ramp(free, speed, SLOW_TIME)
     flat = stage.flat()

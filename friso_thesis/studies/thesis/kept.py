@@ -39,14 +39,16 @@ SOURCES = (
     ),
     *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml", "shares.py"),
 )
-"""Folders and files that decide on what is kept, beside those of the equations, as paths from the package friso."""
+"""Folders and files, besides the equations, whose contents decide on saved results.
+
+Paths start from the package friso."""
 
 Findings = dict[str, Finding]
-"""Findings by a name, such as that of a claim."""
+"""Findings by name, such as that of a claim."""
 
 
 class Kept(KeptWork):
-    """Folders in which maps, experiments and findings of the thesis are kept."""
+    """Folders in which maps, experiments and findings of the thesis are saved."""
 
     sources = SOURCES
 
@@ -85,7 +87,7 @@ class Kept(KeptWork):
         return made
 
     def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
-        """Findings `about` something, as they were kept or made now."""
+        """Return the findings `about` something, saved or computed now."""
         file = self._file("json", "findings", *about)
         if file is not None and (kept := kept_findings(file)) is not None:
             return kept
@@ -101,11 +103,11 @@ class Kept(KeptWork):
 
 
 NOT_KEPT = Kept()
-"""Keeps nothing."""
+"""A store that saves nothing."""
 
 
 def kept_findings(file: Path) -> Findings | None:
-    """Findings from a file; None where there are none, or it is damaged or another's."""
+    """Return the findings in a file; None if it is missing, damaged, or of another kind."""
     try:
         kept = json.loads(stored(file))
         document = kept["findings"]

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CONCLUSIONS = ("E1", *(f"F{figure}{panel}" for figure in (11, 12, 13, 14, 15, 16) for panel in ("", "A", "B")))
-"""The claims that are asked, as far as there are such."""
+"""The claims that are judged under each law, where they exist."""
 
 
 @dataclass(frozen=True)
 class ConclusionByLaw:
-    """A claim, and how it is judged under each law by name, the thesis's own first."""
+    """A claim, and its judgement under each law by name, the thesis's own law first."""
 
     claim: Claim
     findings: Mapping[str, Finding]

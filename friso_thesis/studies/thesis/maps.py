@@ -24,12 +24,15 @@ def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray
 
 
 def peak_counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
-    """Counts of peaks, shape (rows, columns)."""
+    """Return the counted peaks, shape (rows, columns)."""
     return runs["count"].transpose(rows, columns).values
 
 
 def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
-    """Swings at the end over what counts as one, shape (rows, columns); None of a map that has none."""
+    """Return swings at the end relative to the least that counts, shape (rows, columns).
+
+    Returns None for a map without swings.
+    """
     return runs["size"].transpose(rows, columns).values if "size" in runs else None
 
 
@@ -56,7 +59,7 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
 
 
 def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """As `ends`, but the value below which no run keeps moving yet."""
+    """Return the values below which no run keeps moving; the counterpart of `ends`."""
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
 
@@ -68,11 +71,14 @@ def limit_error(values: np.ndarray, limits: int = 1) -> float:
 
 
 GONE = 1e-3
-"""Swing over what counts as one, below which nothing is left of one."""
+"""Swing relative to the least that counts, below which no swing is left."""
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
-    """Spearman's rank correlation of the known pairs; NaN for fewer than three or where one of them is constant."""
+    """Return Spearman's rank correlation of the known pairs.
+
+    It is NaN for fewer than three pairs, or if one side is constant.
+    """
     defined = ~(np.isnan(x) | np.isnan(y))
     ranks = [rankdata(values[defined]) for values in (x, y)]
     if defined.sum() < 3 or any(np.ptp(rank) == 0 for rank in ranks):
@@ -86,7 +92,7 @@ def trend_text(correlation: float) -> str:
 
 
 def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
-    """Share of the valid cells that the largest square of valid cells that come to rest covers."""
+    """Return the fraction of valid cells in the largest square of cells that come to rest."""
     free = valid & ~moving
     side = free.astype(int)  # of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
@@ -97,7 +103,7 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
 
 
 def overlap(part: np.ndarray, total: np.ndarray) -> float:
-    """Share of the cells of `total` that are in `part` too; NaN of an empty whole."""
+    """Return the fraction of the cells of `total` that are in `part` too; NaN for an empty `total`."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 

@@ -23,20 +23,21 @@ from friso_thesis.studies.thesis.studies import STUDIES
 from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 DRAWS, EVERY = 48, 3
-"""Joint draws by default; of every third also linear analysis and experiments are made, which take longer than all the
-maps."""
+"""Default number of joint draws, and interval between draws with linear analysis and experiments.
+
+Analysis and experiments take longer than all maps."""
 
 POINTS = 21
-"""Values per axis of the maps of a draw, whatever those of the baseline have: limits are interpolated."""
+"""Values per axis of the maps of a draw, whatever those of the baseline; limits are interpolated."""
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
 
 MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
-"""Steps of the progress that the maps of a draw count, and its linear analysis and experiments."""
+"""Steps of progress for the maps of a draw, and for its linear analysis and experiments."""
 
 DOUBT = 0.05
-"""Probability of a separation by chance from which it is not reported, over all values of a claim together."""
+"""Probability of a chance separation above which it is not reported, over all values of a claim together."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
 """Parts of the evidence besides maps and responses."""
@@ -57,7 +58,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """In how many draws a part is `met`, and the `share` of draws."""
+    """A part of a claim: the number of draws in which it is `met`, and their fraction of all draws, `share`."""
 
     met: int
     share: Share
@@ -67,7 +68,7 @@ class MetPart:
 class ClaimInSpace:
     """A claim over joint draws.
 
-    `seeds` (seed, number) are those of the draws. `holds` is the share of them in which it holds, `parts` those in
+    `seeds` (seed, number) are those of the draws. `holds` is the fraction of them in which it holds, `parts` those in
     which each part does. `hangs_on` are the values on which that depends, the most decisive first. `failures` say, by
     the number of the draw, why it could not be computed.
     """
@@ -81,27 +82,27 @@ class ClaimInSpace:
 
     @property
     def undecided(self) -> int:
-        """In how many draws it could not be computed."""
+        """Return the number of draws in which the claim could not be computed."""
         return len(self.failures)
 
     @property
     def draws(self) -> int:
-        """Draws tried."""
+        """Return the number of draws tried."""
         return len(self.seeds)
 
     @property
     def misses(self) -> int:
-        """In how many draws it could be computed and does not hold."""
+        """Return the number of draws in which the claim could be computed and does not hold."""
         return self.draws - self.undecided - self.count
 
     def met(self, part: int) -> int:
-        """In how many draws a part holds."""
+        """Return the number of draws in which a part holds."""
         return self.parts[part].met
 
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that the thesis prints for a claim, the criterion it belongs to, and what a draw has."""
+    """A number that the thesis prints for a claim, its criterion, and its value in a draw."""
 
     claim: str
     criterion: str
@@ -209,11 +210,12 @@ def _failure(error: Exception) -> Finding:
 
 
 FAILED = "failed"
-"""Stands after the name of a claim that cannot be computed."""
+"""Suffix of the name of a claim that cannot be computed."""
 
 _SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
-"""What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
-not taken for it."""
+"""Errors that mean that an experiment on a drawn rig shows nothing, such as a loop that stops.
+
+Errors of the program are of other types."""
 
 
 def _in_space(
@@ -239,7 +241,7 @@ def _met(column: Sequence[bool | None], count: int) -> MetPart:
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """Return the share of `count` draws, those beyond the flags being undecided."""
+    """Return the fraction of `count` draws, those beyond the flags being undecided."""
     missing = count - len(flags)
     return share(
         np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
@@ -298,7 +300,7 @@ def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
 
 
 def _misfit(numbers: Sequence[PrintedNumber]) -> float:
-    """Root mean square of ln(found/printed); infinite where one is not found at all."""
+    """Return the root mean square of ln(found/printed); infinite if a number is not found."""
     ratios = np.array([item.read / item.printed for item in numbers], float)
     if not ratios.size or not (np.isfinite(ratios) & (ratios > 0)).all():
         return np.inf

@@ -20,13 +20,13 @@ class WordReading:
 
     - The factor within which a number is `about` another. The factor within which it is `of the order` of another, and
       beyond which it is far below it.
-    - The share of a map's cells up to which they are `few`.
+    - The fraction of a map's cells up to which they are `few`.
     - The rank correlation (Spearman) from which there is a `trend`.
     - The share within which numbers are the `same`, and within which they are `close`, as far as one reads them off a
       figure.
     - The damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied.
-    - The share that is at least `half` or “most” of them, and the share of the range of strokes from which they are
-      `long`.
+    - The fraction that is at least `half` or “most” of them, and the fraction of the range of strokes from which they
+      are `long`.
     - For cycles on the rig: the factor from which one is nearly `twice` as long as another, that within which swings
       are `similar`, and that from which their two sides are `unequal`.
     - The scatter of the period over its mean from which a cycle is less regular, `uneven`.
@@ -48,7 +48,7 @@ class WordReading:
 
 
 OWN = WordReading()
-"""Friso's own reading."""
+"""The reading of words that friso uses."""
 
 _READ: ContextVar[WordReading] = ContextVar("reading", default=OWN)
 
@@ -78,7 +78,7 @@ def words_read() -> Iterator[set[str]]:
 
 
 class _NotedReading:
-    """A reading that notes which of its words are asked for."""
+    """A reading that records which of its words are used."""
 
     def __init__(self, own: WordReading) -> None:
         self._own, self.words = own, set[str]()
@@ -127,7 +127,7 @@ def _otherwise() -> dict[str, WordReading]:
 
 
 OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
-"""Other readings, as reasonable, by what is read otherwise: each in one word, to either side."""
+"""Other reasonable readings, by the change: each differs in one word, upward or downward."""
 
 
 def others_of(words: Set[str]) -> dict[str, WordReading]:
@@ -162,4 +162,4 @@ CONVENTIONS = (
     "what counts, or halfway where nothing is left of it; none beyond it keeps moving. A criterion whose number lies "
     "beside its threshold within its error is undecided, and so is one that no simulation can decide; neither counts."
 )
-"""Reading of the claims' words that all criteria share."""
+"""Note on the reading of words that all criteria have in common."""

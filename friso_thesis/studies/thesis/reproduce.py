@@ -30,11 +30,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 POINTS, MOST_POINTS = 41, 1001
-"""Values per axis: 0.4 Hz apart in Fig. 16; at most, a million cells in every map."""
+"""Default and largest number of values per axis: 0.4 Hz apart in Fig. 16, and a million cells per map."""
 
 JUDGED = 21
-"""Values per axis of the maps on which claims are judged, at least: a region that falls between two values is missed,
-and what is few, or a trend, means nothing on a handful of cells."""
+"""Smallest number of values per axis of maps on which claims are judged.
+
+Coarser maps miss regions between two values, and "few" or a trend has no meaning on a handful of cells."""
 
 MOST_DRAWS = 10_000
 
@@ -42,7 +43,7 @@ RTOL = 1e-4
 """The thesis's relative tolerance (Sec. 3.2.3)."""
 
 VERIFIED = 0.05
-"""Share of the cells of a shown map that are run again at a tighter tolerance."""
+"""Fraction of the cells of a shown map that are run again at a tighter tolerance."""
 
 TIGHT = 1e-8
 """Second relative tolerance for Fig. 14B, besides the thesis's own."""
@@ -51,8 +52,10 @@ SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
 PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
-"""Steps of the progress, of which a run counts one, by the processor time that they take: a part of the linear analysis
-or an experiment; what attracts the stages of a map, with the joint locked and free."""
+"""Steps of progress, in units of a run's processor time.
+
+They are those of a part of the linear analysis or an experiment, and of the survey of a map with the joint locked and
+free."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class Reproduction:
       were judged, which are finer if few values per axis were asked for.
     - The linear analysis of the rig, its curves over frequency in `bode`, and the experiments, each None if no claim of
       this run needs it. `experimented` names the experiments made.
-    - The map of Fig. 14B by relative tolerance. The shares of its cells with peaks at one tolerance only, and with a
+    - The map of Fig. 14B by relative tolerance. The fractions of its cells with peaks at one tolerance only, and with a
       different peak count (NaN if not computed).
     - A verdict per claim, and the claims over the joint draws of the values that the thesis leaves open.
     - The hunting cycles behind each map, by study name.
@@ -185,7 +188,7 @@ def reproduce(
 
 
 def _survey_work(study: ThesisStudy) -> int:
-    """Steps of the progress that the survey of a map counts."""
+    """Return the steps of progress that the survey of a map takes."""
     return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
 
 
@@ -243,7 +246,7 @@ def _others(
 
 
 def _second(runs: xr.Dataset) -> xr.Dataset:
-    """Every second value of each axis; of less than five values all."""
+    """Return every second value of each axis; of fewer than five values, all."""
     return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
 
 
@@ -295,8 +298,11 @@ def _check(name: str, value: int, least: int, most: int, example: str) -> None:
 
 
 def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
-    """Shares of cells in which peaks are counted at one of the two tolerances only, and whose peak count differs; a
-    count that is unknown in both does not differ."""
+    """Return how many cells change between two tolerances, as fractions.
+
+    The first counts cells with peaks at one tolerance only, the second cells whose peak count differs. Counts unknown
+    at both tolerances do not differ.
+    """
     if not tolerances:
         return np.nan, np.nan
     loose, tight = tolerances.values()

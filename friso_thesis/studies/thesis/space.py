@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 LIMITER_PULLS = "joint.limiter_pulls"
 
 SEED = 1
-"""Seed of the draws; together with its number it gives a draw, however many there are."""
+"""Seed of the draws; seed and number determine a draw, whatever the total number."""
 
 _OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
 
@@ -39,7 +39,7 @@ class OpenValue:
     baseline: float
 
     def at(self, share: float) -> float:
-        """Return the value at a share of the way through its range."""
+        """Return the value at a fraction of the way through its range."""
         if self.scale == "either":
             return self.low if share < 0.5 else self.high
         if self.scale == "log":
@@ -119,7 +119,7 @@ OPEN: tuple[OpenValue, ...] = (
         "Sec. 3.5: a bolt and a locking nut, which touch without being joined; Fig. 3 draws a spring and a damper",
     ),
 )  # fmt: skip
-"""All of them."""
+"""All values that the thesis leaves open."""
 
 
 def draw_name(number: int) -> str:
@@ -129,7 +129,7 @@ def draw_name(number: int) -> str:
 
 @dataclass(frozen=True)
 class Draw:
-    """One joint draw: its number, and the values by name, in the order of `OPEN`."""
+    """One joint draw: its number, and its values by name, in the order of `OPEN`."""
 
     number: int
     values: Mapping[str, float]
@@ -172,7 +172,7 @@ def draw(number: int) -> Draw:
 
 
 def baseline() -> Draw:
-    """Friso's own choice of all of them."""
+    """Return friso's own choice of all open values."""
     return Draw(-1, {value.name: value.baseline for value in OPEN})
 
 

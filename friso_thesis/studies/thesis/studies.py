@@ -76,13 +76,15 @@ def thesis_rig() -> Stage:
 
 
 def rig_crossover() -> float:
-    """Crossover of the rig [Hz]."""
+    """Return the crossover of the rig [Hz]."""
     return float(thesis_rig().flat()[CROSSOVER])
 
 
 def rig_gains(mass: float) -> tuple[float, float, float]:
-    """k_p [N/m], k_i [N/(m s)] and k_d [N s/m] of Eq. 6 by Eq. 7 and 8 for a mass [kg], at the crossover, alpha and
-    beta of the rig."""
+    """Return k_p [N/m], k_i [N/(m s)] and k_d [N s/m] of Eq. 6 for a mass [kg].
+
+    They follow from Eq. 7 and 8, at the crossover, alpha and beta of the rig.
+    """
     gains = as_gains(**numbers({**thesis_rig().flat(), TUNED_MASS: mass}))
     return gains["kp"], gains["ki"], gains["kd"]
 
@@ -193,4 +195,6 @@ _ALL = (
 )
 
 STUDIES: Mapping[str, ThesisStudy] = MappingProxyType({study.name: study for study in _ALL})
-"""The studies of Table 3 by name, in the order of the figures; the last, of the softer joint, is of Fig. 16 alone."""
+"""The studies of Table 3 by name, in the order of the figures.
+
+The last, of the softer joint, belongs to Fig. 16 alone."""

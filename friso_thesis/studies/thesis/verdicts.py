@@ -13,8 +13,9 @@ from friso_thesis.studies.thesis.plausible import ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
 
 ROBUST = 0.25
-"""Share of the space in which a claim may hold after all, up to which its contradiction is called robust: 13 draws
-without it."""
+"""Largest fraction of the space in which a claim may hold while its contradiction is called robust.
+
+Thirteen draws in which it does not hold show that."""
 
 NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
@@ -62,14 +63,14 @@ class ClaimVerdict:
     def robust(self) -> bool:
         """Tell whether no plausible choice of what the thesis leaves open makes a claim hold that does not.
 
-        It holds in no draw, its share is at most `ROBUST` by its interval, and nothing undrawn decides on it.
+        It holds in no draw, its fraction is at most `ROBUST` by its interval, and nothing undrawn decides on it.
         """
         fails = self.judgement in ("holds in part", "differs")
         return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
 
     @property
     def dependence(self) -> str:
-        """In which share of the draws it holds, and on what that depends."""
+        """Say in which fraction of the draws a claim holds, and on what that depends."""
         if self.finding is None:
             return ""
         if self.space is None:
@@ -102,7 +103,7 @@ class ClaimVerdict:
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """Return the share of the joint draws in words."""
+    """Return the fraction of the joint draws in words."""
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 COUNT, CYCLE = "the thesis's count", "an attracting cycle"
-"""The ways by name: peaks are counted (plain `findpeaks`, Sec. 3.2.2); a cycle attracts, whatever the move."""
+"""Names of the two ways to judge hunting: counted peaks (plain `findpeaks`, Sec. 3.2.2), and an attracting cycle,
+whatever the move."""
 
 
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:

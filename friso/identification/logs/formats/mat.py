@@ -20,7 +20,7 @@ from friso.identification.logs.units import split_heading
 
 @dataclass
 class _Contents:
-    """What a file contains, gathered in a walk through it."""
+    """Contents of a file, collected in a walk through its tree."""
 
     channels: list[Channel] = field(default_factory=list)
     scalars: dict[str, float] = field(default_factory=dict)
@@ -144,7 +144,7 @@ def _text(node: Any) -> str:
 
 
 def _recognise(head: FileHead) -> bool:
-    """Recognise a MAT file by its first bytes, by those behind MATLAB's block, or by its name."""
+    """Recognise a MAT file by its first bytes, by the bytes after MATLAB's header block, or by its name."""
     start = head.start
     return start.startswith(b"MATLAB ") or is_hdf5(start) or head.path.suffix.lower() == ".mat"
 

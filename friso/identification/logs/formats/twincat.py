@@ -1,6 +1,6 @@
 """TwinCAT Scope CSV export: rows of keys, then a time column and value columns per group of channels.
 
-A row of the file is no instant: groups with different sample times stand side by side and end at different rows.
+A row of the file is not one instant: groups with different sample times stand side by side and end at different rows.
 Layout after the exports of Scope 3.4 in github CagtayFabry/pytcs (tests/data) and Beckhoff's page "Scope Settings"
 (infosys, tcscope2): a key ("Name", "Unit", ...) is repeated at the head of each time column, or of each channel.
 """
@@ -22,11 +22,12 @@ from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 
 _FILETIME = 1e15
-"""Above this a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a double
-it is known to 16 steps, 1.6 us, which the fit of an even time base averages out."""
+"""Value above which a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a
+double it is accurate to 16 steps, 1.6 us, which the fit of an even time base averages out."""
 CERTAIN = ("\t", ";", ",")
 DELIMITERS = (*CERTAIN, ":", " ")
-"""What Scope may write between cells; a first line "Name x" with one of the last two may be that of any text."""
+"""Characters that Scope may write between cells. A first line "Name x" with one of the last two may be that of any
+text."""
 _MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", "Data-Type")
 
 
@@ -70,7 +71,7 @@ def read_twincat(path: Path) -> ChannelTable:
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
-    """Split a line into cells; further spaces are the empty cells of groups that have ended."""
+    """Split a line into cells; trailing separators are the empty cells of groups that have ended."""
     return [cell.strip() for cell in csv_cells(line, delimiter)]
 
 
@@ -120,8 +121,8 @@ def _channels(
 def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
     """Check that no row lacks cells in the middle.
 
-    In the row in which a group ends, the clock of another one would jump: the cells of the first are missing, with
-    their delimiters, and those behind them have moved to the left. Raises LogError.
+    If cells of a group that has ended are missing with their delimiters, the cells behind them have moved to the left,
+    and the clock of another group jumps. Raises LogError.
     """
     ends = np.array(sorted({time.size for time in times} - {0}))
     for time in times:
@@ -141,7 +142,7 @@ def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.nd
 
 
 def _source(column: int, info: dict[str, str]) -> str:
-    """Say where a channel stands in the file."""
+    """Return the place of a channel in the file, in words."""
     texts = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
     return ", ".join([f"column {column + 1}", *texts])
 

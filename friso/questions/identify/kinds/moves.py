@@ -125,7 +125,7 @@ def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
 
 
 def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
-    """Return what is left of the force, for the document."""
+    """Return the residual force, for the document."""
     residual = moves.residual
     return {
         "rms_n": residual.rms,

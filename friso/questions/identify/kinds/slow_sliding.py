@@ -17,7 +17,7 @@ from friso.questions.identify.numbers import with_interval
 from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 
 POINTS, CURVE = 5000, 200
-"""Points of a record of slow sliding, and of the curve at steady velocities, that are drawn."""
+"""Numbers of points drawn: of a record of slow sliding, and of the curve at steady velocities."""
 
 
 def _facts(result: SlowSliding) -> Facts:
@@ -55,7 +55,7 @@ def slow_sliding_caption(result: SlowSliding) -> str:
 
 
 def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
-    """Draw friction over time, and over velocity, as it was and as the model has it."""
+    """Draw measured and modelled friction over time and over velocity."""
     friction = Axis("Friction, low-passed", "N")
     thinned = slice(None, None, max(len(result.time) // POINTS, 1))
 
@@ -71,7 +71,7 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
 
 
 def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
-    """Draw the friction at steady velocities without the viscous part, either way."""
+    """Draw the friction at steady velocities without the viscous part, in both directions."""
     coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
     if not all(estimate.determined for estimate in result.estimates):
         return ()

@@ -43,7 +43,7 @@ def _numbers(result: StepStiffness) -> dict[str, Any]:
 
 
 def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw deflection and force over time with the settled windows, and the one over the other."""
+    """Draw deflection and force over time with the settled windows, and force over deflection."""
     panels = []
     for quantity, unit, values in (("Deflection", "m", result.position), ("Force", "N", result.force)):
         low, high = float(values.min()), float(values.max())

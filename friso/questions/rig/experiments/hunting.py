@@ -1,6 +1,6 @@
 """Show the results of `friso rig hunting`.
 
-These are Fig. 24 and 25 of the thesis, and the share of rails with counted peaks.
+These are Fig. 24 and 25 of the thesis, and the fraction of rails with counted peaks.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ COLOURS = {"locked": VERMILLION, "free": BLUE}
 AREAS = {"locked": "#f6dccb", "free": "#cfdfee"}
 LINES = (GREY, GREEN, VERMILLION, ORANGE, PINK, SKY, BLUE, INK, GREY)
 AFTERWARDS = 5.0
-"""From where on [s] what is left of the move decides the height of a panel."""
+"""Time [s] after which the remaining deviation sets the height of a panel."""
 
 
 def rails_text(share: Share, count: int) -> str:
-    """Write a share of rails with its interval."""
+    """Write a fraction of rails with its interval."""
     return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
 
 
@@ -119,7 +119,7 @@ def _started(moves: HuntingResult) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw Fig. 24 and 25, the share of rails over the crossover, and a start by release."""
+    """Draw Fig. 24 and 25, the fraction of rails over the crossover, and a start by release."""
     moves: HuntingResult = outcome.result
     figures = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
     return [*figures, _startable(moves)] if moves.startable is not None else figures
@@ -193,7 +193,7 @@ def _crossovers(moves: HuntingResult) -> Figure:
 
 
 def _shares(moves: HuntingResult) -> Figure:
-    """Draw the share of rails with counted peaks over the crossover, with its interval."""
+    """Draw the fraction of rails with counted peaks over the crossover, with its interval."""
     bands, lines = [], []
     for case, colour in COLOURS.items():
         shares = moves.shares(case)
@@ -245,7 +245,7 @@ def runs_document(runs: RailRuns) -> dict[str, Any]:
 
 
 def share_document(share: Share) -> dict[str, float]:
-    """Return a share and its 95 % interval."""
+    """Return a fraction and its 95 % interval."""
     return {"share": share.probability, "low": share.low, "high": share.high}
 
 

@@ -15,7 +15,7 @@ from friso.studies.rig.experiments.presliding import LOOPS, Bristles
 from friso.studies.rig.outcome import Outcome
 
 ROWS = 4
-"""Rows of loops in their figure."""
+"""Number of rows of loops in the figure."""
 
 
 def sentences(outcome: Outcome) -> list[str]:

@@ -22,15 +22,15 @@ from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 
 DURATIONS = (480.0, 120.0)
-"""Periods of the crossover that the way takes: 2.5 and 10 mm/s on the thesis's rig."""
+"""Duration of the way in periods of the crossover: 2.5 and 10 mm/s on the thesis's rig."""
 
 
 @dataclass(frozen=True)
 class Passes:
-    """Results of passes at constant speed, with the joint as `name` says.
+    """Results of passes at constant speed, with the joint as in `name`.
 
-    They are friction along the place and against the velocity. The true mean dynamic friction at the two speeds over
-    the way [N] has the shape (2,).
+    They are friction over place and over velocity. The true mean dynamic friction at the two speeds over the way [N]
+    has the shape (2,).
     """
 
     name: str

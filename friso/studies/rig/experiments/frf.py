@@ -25,28 +25,29 @@ PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""
 
 SETTINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Crossovers over the stage's: 8 to 48 Hz (Fig. 22)."""
+"""Crossovers over the stage's own: 8 to 48 Hz (Fig. 22)."""
 
 RATIOS = (1.0, 0.68, 1.47)
-"""True motor constants over the believed one that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
+"""Ratios of true to assumed motor constant that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
 
 BESIDE = 3.0
-"""The mass line of the free joint is read from so many times its first mode up to the parasitic one over as much."""
+"""Distance of the free joint's mass line from its first mode and from the parasitic one, as factors of frequency."""
 
 FASTER, STEPS = 1.1, 33
-"""Settings that are tried for stability: from the highest of `SETTINGS` over 3 on, each so much faster, so many."""
+"""Factor between successive settings tried for stability, from a third of the highest of `SETTINGS` on, and their
+number."""
 
 RELEASED, WAIT = 0.01, 8.0
-"""From so many strokes off its reference the free stage is released, and for so many periods of the stage's crossover;
-a loop whose error in the last quarter is larger than that is not stable."""
+"""Release of the free stage in strokes off its reference, and duration in periods of the stage's crossover. A loop with
+a larger error in the last quarter is not stable."""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """The plant as identified: single identifications, and all together.
+    """The plant as identified: single identifications, and the combination.
 
-    It has the frequency [Hz] of the first mode of a free joint (NaN: locked), and the mass line with the frequencies
-    [Hz] between which it is read.
+    It has the frequency [Hz] of the first mode of a free joint (NaN: locked), and the mass line with its frequency
+    range [Hz].
     """
 
     single: tuple[FrequencyResponse, ...]
@@ -58,7 +59,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """An open loop tuned to a crossover [Hz], and where it truly crosses 0 dB [Hz].
+    """An open loop tuned to a crossover [Hz], and its true crossing of 0 dB [Hz].
 
     It has no lines if the closed loop was not stable.
     """
@@ -78,8 +79,8 @@ class Frf:
     """Results of the frequency-response experiment.
 
     They are the plants, the open loops locked at several settings and free, and apparent masses [kg], shape (2,
-    ratios), locked and free, for the motor constants of `RATIOS`. With the joint free there are the settings [Hz]
-    tried, shape (STEPS,), and which of them were stable.
+    ratios), locked and free, for the motor constants of `RATIOS`. With the joint free there are the tried settings
+    [Hz], shape (STEPS,), and which of them were stable.
     """
 
     locked: Plant
@@ -106,7 +107,7 @@ def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
 
 
 def crossing_near_target(loop: MeasuredLoop) -> float:
-    """Return the crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
+    """Return the crossing of 0 dB [Hz] nearest to the tuned one; NaN without any."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 
@@ -182,7 +183,7 @@ def locked_plant(logs: list[RigLog]) -> Plant:
 
 
 def free_plant(logs: list[RigLog]) -> Plant:
-    """Return the averaged response; its first mode is where it is the largest against a mass."""
+    """Return the averaged response; its first mode is at the largest ratio to a mass."""
     averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)
@@ -207,7 +208,7 @@ def mass_between(response: FrequencyResponse, low: float, high: float) -> Estima
 
 
 def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
-    """Masses [kg] that the mass line shows for the motor constants of `RATIOS`."""
+    """Return the masses [kg] that the mass line shows for the motor constants of `RATIOS`."""
     ratios = np.array(RATIOS)
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
     logs = [rig_log(recorded, row, "", None, stage, seed) for row in range(len(ratios))]

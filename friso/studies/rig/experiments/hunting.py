@@ -1,4 +1,4 @@
-"""A move at several crossovers, the joint locked and free.
+"""A move at several crossovers, with the joint locked and free.
 
 Thesis, Fig. 24, 25; on the stage's rail and on repeated ones.
 """
@@ -36,14 +36,14 @@ from friso.virtual_rig.run import RecordedRuns
 from friso.virtual_rig.task import MoveTask
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
-"""Over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others ours."""
+"""Crossovers over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others friso's choice."""
 
 SHOWN = (2, 3, 6)
-"""The thesis's among them."""
+"""Indices of the thesis's crossovers among them."""
 
 DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
-"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig, our
-choice."""
+"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig
+(friso's choice)."""
 
 CASES = {"locked": True, "free": False}
 
@@ -60,8 +60,8 @@ class Trace:
 class Startable:
     """A machine that comes to rest `after_move` and swings `after_release`.
 
-    No peaks are counted after the move, and after the release it swings as long as it is observed. It has its
-    crossover [Hz], the number of its rail, and the displacement [m] of the release.
+    No peaks are counted after the move, and after the release it swings to the end. It has its crossover [Hz], the
+    number of its rail, and the displacement [m] of the release.
     """
 
     after_move: Trace
@@ -96,7 +96,7 @@ class HuntingResult:
     startable: Startable | None
 
     def shares(self, case: str) -> list[Share]:
-        """Return the share of rails on which peaks are counted, by crossover."""
+        """Return the fraction of rails on which peaks are counted, by crossover."""
         return [self.cases[case].share(row) for row in range(len(self.crossovers))]
 
     def limit(self, case: str, rail: int | None = None) -> float:

@@ -1,7 +1,7 @@
 """Stiffness and damping of the bearing's bristles by small motion before it slides, and loops up to break-away.
 
-The loops, of force over displacement, tell friction laws apart. The joint is locked. The thesis has no such experiment,
-but the bristles decide whether a machine near the boundary of hunting hunts.
+The loops tell friction laws apart. The joint is locked. The thesis has no such experiment, but the bristles decide
+whether a machine near the boundary of hunting hunts.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import standing
 
 PLACES = 3
-"""Places along the travel: our choice."""
+"""Number of places along the travel (friso's choice)."""
 
 GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
-"""A twentieth of static friction, RMS, up to 96 Hz on the thesis's rig, logged every 0.75 ms; longest time [s] from
-sample to sample on slower ones."""
+"""Excitation of a twentieth of static friction, RMS, up to 96 Hz on the thesis's rig, logged every 0.75 ms; longest
+sample time [s] on slower rigs."""
 
 LOOPS = np.linspace(0.2, 0.9, 8)
-"""Shares of static friction up to which the force of a loop swings: along the rail some break away."""
+"""Force amplitudes of loops over static friction; along the rail some break away."""
 
 PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
-"""Periods of the crossover that a loop takes, how often it is run through, and samples of its log per period of the
-crossover (0.5 s and 1 ms on the thesis's rig)."""
+"""Periods of the crossover that a loop takes, number of loops, and samples of the log per period of the crossover (0.5
+s and 1 ms on the thesis's rig)."""
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,7 @@ def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 
 
 def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
-    """Return the log of a loop at a place [m]: a sine of force up to a share of friction.
-
-    `share` is that of static friction.
-    """
+    """Return the log of a loop at a place [m]: a sine of force, of a fraction `share` of static friction."""
     step = as_built_keys(stage)["drive.sample_time"]
     samples = round(PERIOD / pace(stage) / step)
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)

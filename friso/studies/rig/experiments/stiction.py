@@ -1,6 +1,6 @@
 """Static friction by stick-slip in slow motion.
 
-The joint is free (thesis, Sec. 4.2.3, Fig. 20).
+Thesis, Sec. 4.2.3, Fig. 20.
 """
 
 from __future__ import annotations
@@ -23,24 +23,26 @@ from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs
 
 RAILS = 10
-"""Stretches of rail, each a rail drawn anew: our choice, the thesis has "multiple experiments"."""
+"""Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""
 
 LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
-"""Periods of the crossover in which the joint is loaded up to the friction (2 s on the thesis's rig: 0.63 mm/s), for
-which the reference stands between its velocities, and samples of the log per period (1 ms)."""
+"""Timing of the experiment in periods of the crossover, and samples of the log per period.
+
+The joint is loaded up to the friction force in the first time (2 s on the thesis's rig, at 0.63 mm/s). The reference
+stands for the second time between velocities. Samples are 1 ms apart on the thesis's rig."""
 
 SLIPS = 8
-"""Loads of the joint that each leg lasts."""
+"""Loads of the joint in each leg."""
 
 SPEEDS = (1, 2, -1, -2)
-"""Velocities one after the other, over the slow one: forward and back; our choice."""
+"""Successive velocities over the slow one: forward and back (friso's choice)."""
 
 
 @dataclass(frozen=True)
 class Stiction:
     """Results of the stiction experiment.
 
-    Each log is read with the joint's true stiffness. For each rail there are the least and greatest true static
+    Each log is evaluated with the joint's true stiffness. For each rail there are the least and greatest true static
     friction [N] along the cart's way, shape (rails, 2), and the slow velocity [m/s].
     """
 
@@ -50,7 +52,7 @@ class Stiction:
 
     @property
     def forces(self) -> np.ndarray:
-        """Break-away forces [N] of all slips, shape (slips,)."""
+        """Return the break-away forces [N] of all slips, shape (slips,)."""
         return np.concatenate([slips.forces for slips in self.by_rail])
 
 
@@ -75,7 +77,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def _note(flat: Mapping[str, Any]) -> str:
-    """Return how the stage was set up."""
+    """Return a note on the set-up of the stage."""
     stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
     return f"the limiters are set to {stroke}, which is recorded beside the logs for friso identify"
 
@@ -105,13 +107,13 @@ def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]
 
 
 def _log(free: Stage, chunk: RecordedRuns, row: int, number: int, seed: int) -> RigLog:
-    """One rail's log, with the stage that has this rail."""
+    """Return one rail's log, with the stage that has this rail."""
     on_rail = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
     return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", on_rail, seed + number)
 
 
 def true_range(log: RigLog) -> tuple[float, float]:
-    """Least and greatest static friction [N] where the cart went."""
+    """Return the least and greatest static friction [N] along the cart's way."""
     flat = anywhere(log.stage.flat())
     along = level_under_conditions(flat, "static") * friction_factors(flat, log.true["cart_position"])[0]
     return float(along.min()), float(along.max())

@@ -1,4 +1,4 @@
-"""Stiffness of the joint by position steps, the cart fixed.
+"""Stiffness of the joint by position steps, with the cart fixed.
 
 Thesis, Sec. 4.2.2, Fig. 19.
 """
@@ -20,20 +20,18 @@ from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
 
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
-"""A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""
+"""Size of a step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and directions of the steps (friso's choice)."""
 
 STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
-"""Periods of the crossover for which each step stands (2 s on the thesis's rig) and at most may; so many time constants
-of the integrator against the joint, if it is not longer; samples of the log per period (1 ms): our choice, the thesis
-states neither."""
+"""Periods of the crossover for which each step stands (2 s on the thesis's rig), at least and at most; time constants
+of the integrator against the joint, if these take longer; samples of the log per period (1 ms), friso's choice."""
 
 
 @dataclass(frozen=True)
 class Stiffness:
     """Results of the stiffness experiment: the fit to the log, and the true stiffness [N/m].
 
-    The motor's true constant over the assumed one is the factor by which the drive's newtons are smaller than true
-    ones.
+    The ratio of true to assumed motor constant is the factor by which the drive's newtons are too small.
     """
 
     steps: StepStiffness
@@ -42,12 +40,12 @@ class Stiffness:
 
     @property
     def apparent(self) -> float:
-        """Stiffness [N/m] that the believed force makes of the true one."""
+        """Return the stiffness [N/m] that the drive's newtons make of the true one."""
         return self.true / self.motor_constant_ratio
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Steps of the reference with the cart fixed. Raises InputError for a stage without a joint."""
+    """Run steps of the reference with the cart fixed. Raises InputError for a stage without a joint."""
     progress(0, 1, "position steps")
     log = steps(stage, seed)
     progress(1, 1, "")
@@ -71,10 +69,9 @@ def steps(stage: Stage, seed: int) -> RigLog:
 
 
 def pulling_time(stage: Stage) -> float:
-    """Return the time constant [s] with which the integrator pulls the joint to the reference.
+    """Return the time constant [s] with which the integrator pulls the joint to the reference, with the cart fixed.
 
-    The cart is fixed. It is proportional gain plus the joint's stiffness, over the integral gain; 0 without an
-    integrator.
+    It is proportional gain plus the joint's stiffness, over the integral gain; 0 without an integrator.
     """
     flat = stage.flat()
     proportional, integral = slow_gains(flat)
@@ -82,7 +79,7 @@ def pulling_time(stage: Stage) -> float:
 
 
 def _notes(stage: Stage) -> tuple[str, ...]:
-    """Return what to know of the result."""
+    """Return notes on the result."""
     notes = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
     if stage.flat().get("cable.stiffness", 0.0) > 0:
         notes.append("the cables move with the stage: their stiffness is included in the result")

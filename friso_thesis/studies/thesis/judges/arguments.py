@@ -24,16 +24,16 @@ LIGHT, HEAVY = "1.7 kg", "2.5 kg"
 """The responses of the locked rig with the mass weighed and with the mass identified (Sec. 4.2.1)."""
 
 _MEASURED = 1.0, 2.5
-"""Static friction by Fig. 20 [N]."""
+"""Range of static friction [N] in Fig. 20."""
 
 _PEAK_FORCE, _PRESCRIBED, _GRAVITY, _TENFOLD = 200.0, 100.0, 9.81, 10.0
 """Peak force of the actuator [N] and accelerations [m/s^2, g] (Sec. 3.5, 4.3.2)."""
 
 _MASSES = 1.7, 2.5
-"""Weighed, and identified [kg]."""
+"""Weighed mass, and identified mass [kg]."""
 
 _START = 0.02
-"""Time [s] after break-away in which the acceleration is read."""
+"""Time [s] after break-away at which the acceleration is read."""
 
 
 @judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
@@ -76,7 +76,10 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
 
 @lru_cache(maxsize=256)
 def _margins(stage_file: str) -> dict[float, float]:
-    """Modulus margin of the settled states (0: not stable), by the mass [kg] that the controller is tuned for."""
+    """Return the modulus margin of the settled states, by the mass [kg] for which the controller is tuned.
+
+    The margin is 0 for an unstable loop.
+    """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     whole = flat["masses.cart"] + flat["masses.stage"]
     masses = np.geomspace(flat["masses.stage"], whole, JudgeSettings.current().tuned_masses)
@@ -207,9 +210,9 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 @judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     """Judge whether counted peaks mean a cycle:
-    the share of cells with peaks whose run still swings at its end.
+    the fraction of cells with peaks whose run still swings at its end.
 
-    By attraction, it is the share of decided cells that a cycle attracts, for every map.
+    By attraction, it is the fraction of decided cells that a cycle attracts, for every map.
     """
     words = reading()
     rows, counted, lasting = [], 0, 0

@@ -123,6 +123,9 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
 
 
 def _mean_rank_correlation(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> float:
-    """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that keep moving."""
+    """Return the mean rank correlation of the rows of x and y, over the cells that keep moving.
+
+    All arrays have one shape.
+    """
     trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, moving, strict=True))])
     return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan

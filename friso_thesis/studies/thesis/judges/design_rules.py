@@ -21,7 +21,7 @@ _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
 
 _WORKS, _LOCKED = 5.25, 15.0
-"""Crossovers [Hz] from which the isolator works, the middle of 5 and 5.5 Hz, and which the locked rig needs."""
+"""Crossovers [Hz] above which the isolated rig works (middle of 5 and 5.5 Hz), and above which the locked rig does."""
 
 _MOVING_MASS, _WEIGHED = 2.5, 1.7
 """Moving mass [kg] of the rig to which the abstract ties them, and the mass weighed, that of the simulations."""
@@ -33,7 +33,7 @@ _HIGHEST = 48.0
 """Crossover [Hz] up to which the thesis's rig was stable (Sec. 4.3.1, 4.3.3)."""
 
 _RATIOS = np.geomspace(2.0, 80.0, 16)
-"""Parasitic frequencies that are tried, over the crossover."""
+"""Parasitic frequencies tried, relative to the crossover."""
 
 
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
@@ -152,7 +152,10 @@ def _gap(evidence: Evidence) -> Part:
 
 @cache
 def _locked_edge() -> str:
-    """Up to where the cycle of the locked rig attracts with the mass of the rule, as `friso check` finds it."""
+    """Say up to which crossover the cycle of the locked rig attracts, with the mass of the rule.
+
+    The crossover is that of `friso check`.
+    """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
     if edge is None or edge.crossover is None:
@@ -161,7 +164,7 @@ def _locked_edge() -> str:
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
-    """From where on the isolated and the locked rig come to rest."""
+    """Return from which crossover on the isolated and the locked rig come to rest."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")

@@ -24,7 +24,7 @@ from friso_thesis.studies.thesis.judges.rig_loops import RAIL
 from friso_thesis.studies.thesis.reading import reading
 
 _STIFFNESS = 2.9e3
-"""By Fig. 19 [N/m] (Sec. 4.2.2)."""
+"""Stiffness of the joint [N/m] in Fig. 19 (Sec. 4.2.2)."""
 
 _SPIKE = 0.1
 """Time [s] within which a spike of the velocity follows a peak of the deflection."""
@@ -72,7 +72,7 @@ def judged_steps(steps: JointSteps) -> Finding:
 
 @judges("F20", figure="20", needs=(SLIPS,), undrawn="the static friction, which is entered")
 def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
-    """Slow motion with the joint free, at several speeds."""
+    """Judge the static friction from stick-slip with the joint free, at several speeds."""
     return judged_slips(evidence.experiments.slow_motion)
 
 
@@ -121,7 +121,7 @@ def _spikes(run: SlowMotion) -> bool:
 
 @judges("F21", figure="21", needs=(SPEEDY,), undrawn=RAIL)
 def force_at_constant_speed(evidence: Evidence) -> Finding:
-    """Passes of the rig as built with the joint free, as in Sec. 4.2.3, and locked."""
+    """Judge the force of passes at constant speed, with the joint free, as in Sec. 4.2.3, and locked."""
     return judged_speeds(*evidence.experiments.constant_speed)
 
 
@@ -132,7 +132,7 @@ def force_swings(runs: ConstantSpeed) -> list[float]:
 
 
 def _swing_text(share: float) -> str:
-    """Such a share, to a hundredth of a percent: below that the force is steady."""
+    """Write a fraction to a hundredth of a percent; smaller ones mean a steady force."""
     return percent(round(share, 4))
 
 
@@ -174,7 +174,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
 
 
 def _between(shares: list[float]) -> str:
-    """Return the least and the greatest of some shares."""
+    """Return the least and the greatest of some fractions."""
     return f"{_swing_text(min(shares))} to {_swing_text(max(shares))}" if shares else "of no pass"
 
 

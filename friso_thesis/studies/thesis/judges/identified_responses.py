@@ -16,13 +16,13 @@ from friso_thesis.studies.thesis.linear import PLANT
 from friso_thesis.studies.thesis.reading import reading
 
 MEASURED, WEIGHED = (2.5, 0.75), (1.7, 0.5)
-"""Masses [kg] of the whole rig and of its stage: by their mass lines (Fig. 17, 18), and as weighed (Sec. 4.2.1)."""
+"""Masses [kg] of the whole rig and of its stage: measured by mass lines (Fig. 17, 18), and weighed (Sec. 4.2.1)."""
 
 CONSTANTS = (MEASURED[0] / WEIGHED[0], MEASURED[1] / WEIGHED[1])
-"""How many times too small the motor constant would have to be taken to read them so."""
+"""Ratios by which the motor constant would have to be underestimated to explain the measured masses."""
 
 _LINE_TO, _NOISY = 200.0, (10.0, 80.0)
-"""Up to where the mass line is seen, and where single identifications are noisy [Hz] (Sec. 4.2.1)."""
+"""Upper end of the visible mass line, and range in which single identifications are noisy [Hz] (Sec. 4.2.1)."""
 
 FIRST, _PARASITIC = 11.0, 300.0
 """Modes of the free joint [Hz] (Sec. 4.2.1)."""
@@ -79,7 +79,7 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
 
 @judges("F18", figure="18", needs=(PLANT, BUILT))
 def response_of_the_free_joint(evidence: Evidence) -> Finding:
-    """Modes and mass line of the free joint, and whether one error would explain both masses."""
+    """Judge modes and mass line of the free joint, and whether one error would explain both masses."""
     words = reading()
     plants = evidence.analysis.plants
     stuck, sliding = plants["stuck"], plants["sliding"]

@@ -21,7 +21,9 @@ STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
 """What the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa] (Sec. 3.5)."""
 
 _CLOSE = 0.05
-"""Share within which stiffness and first frequency, of which nothing is left open but the steel, should agree."""
+"""Relative difference within which stiffness and first frequency should agree.
+
+Only the steel is left open for both."""
 
 _YOUNG = (185e9, 195e9, 210e9)
 """Young's moduli [Pa] of stainless spring steel: as rolled, tempered, and of steel in general."""
@@ -60,7 +62,7 @@ def mechanism(young: float, spacing: float, height: float) -> Mechanism:
 
 @judges("S35", figure="Sec. 3.5, leaf springs")
 def the_leaf_springs(evidence: Evidence) -> Finding:
-    """Stiffness, frequencies and stress, by geometrically exact beams."""
+    """Judge stiffness, frequencies and stress of the leaf springs, by geometrically exact beams."""
     evaluations = _evaluated()
     stiffness = np.array([evaluation.drive[0] for evaluation in evaluations])
     first = np.array([evaluation.modes[0].frequency for evaluation in evaluations])
@@ -111,7 +113,7 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 
 def _as_beams(young: float) -> float:
-    """Drive stiffness [N/m] of leaves that curl freely across their width: n 12 E I/L^3."""
+    """Return the drive stiffness [N/m] of leaves that curl freely across their width: n 12 E I/L^3."""
     own = mechanism(young, _SPACINGS[0], _HEIGHTS[0])
     return own.leaves * 12 * own.young * own.bending / own.length**3
 

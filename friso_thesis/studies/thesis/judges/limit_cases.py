@@ -9,14 +9,14 @@ from friso_thesis.studies.thesis.linear import PARASITIC, PLANT, LimitCase
 from friso_thesis.studies.thesis.reading import about, reading
 
 _FIRST = 10.0
-"""Where the thesis finds the eigenfrequency of the free joint [Hz] (Sec. 3.4.2)."""
+"""Eigenfrequency of the free joint [Hz] in the thesis (Sec. 3.4.2)."""
 
 _FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
 
 
 @judges("F7", figure="7", needs=(PLANT,))
 def four_limit_cases(evidence: Evidence) -> Finding:
-    """Resonances, antiresonances and mass lines of the plant."""
+    """Judge resonances, antiresonances and mass lines of the plant in the four limit cases."""
     plants = evidence.analysis.plants
     return Finding(
         (*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants, _masses(evidence))), _table(plants)
@@ -24,7 +24,7 @@ def four_limit_cases(evidence: Evidence) -> Finding:
 
 
 def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
-    """Every limit case with its modes and its mass line."""
+    """Return the table of limit cases with their modes and mass lines."""
     rows = []
     for name in (*_FREE, *_TOUCHED):
         case = plants[name]
@@ -104,8 +104,10 @@ def _why_far(ratio: float) -> str:
 
 
 def _masses(evidence: Evidence) -> dict[bool, float]:
-    """Mass [kg] that moves above the first eigenfrequency, by whether the limiter is touched: that of the stage, or of
-    the whole rig."""
+    """Return the mass [kg] that moves above the first eigenfrequency.
+
+    Its key tells whether the limiter is touched (True) or free (False).
+    """
     flat = evidence.rig.flat()
     return {False: flat["masses.stage"], True: flat["masses.cart"] + flat["masses.stage"]}
 

@@ -18,15 +18,18 @@ from friso_thesis.studies.thesis.linear.trials import IDENTIFIED, LITTLE
 from friso_thesis.studies.thesis.reading import about, reading
 
 _SIMULATED, _MEASURED = 60.0, 48.0
-"""The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
+"""Highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
 
 _CROSSES = 20.0
-"""Where the free rig crossed 0 dB, tuned to 8 Hz [Hz] (Sec. 4.2.4)."""
+"""Frequency [Hz] at which the free rig, tuned to 8 Hz, crossed 0 dB (Sec. 4.2.4)."""
 
 
 @judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
 def stable_at_every_speed(evidence: Evidence) -> Finding:
-    """Stability over the speed of the cart, what speed does to the loop, and the crossover by the design method."""
+    """Judge stability over the speed of the cart, and the crossover by the design method.
+
+    The finding also says how speed changes the loop.
+    """
     words = reading()
     analysis = evidence.analysis
     single = analysis.free.single
@@ -183,7 +186,7 @@ def crossing_nearest(margins: Margins, frequency: float) -> float:
 
 
 def _further(margins: Margins, setting: float) -> tuple[float, ...]:
-    """Crossings of 0 dB above that of the crossover tuned for [Hz]."""
+    """Return the crossings of 0 dB above that of the tuned crossover [Hz]."""
     return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 

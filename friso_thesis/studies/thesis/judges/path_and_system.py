@@ -32,7 +32,7 @@ TRAVEL = 0.16
 
 @judges("F11A", figure="11A", needs=("path",))
 def path_is_no_cure(evidence: Evidence) -> Finding:
-    """Scattered cells that settle below a hyperbola of acceleration and its time, none above it."""
+    """Judge whether scattered cells settle only below a hyperbola of acceleration and its time."""
     words = reading()
     acceleration, time, moving, valid = verdict_table(
         evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"

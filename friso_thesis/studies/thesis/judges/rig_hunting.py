@@ -25,23 +25,23 @@ _ASSUMED = (
 )
 
 _DEVIATIONS = 0.1e-6, 1e-6
-"""Peaks by Fig. 28 with the joint locked and free [m]."""
+"""Peak deviations in Fig. 28 with the joint locked and free [m]."""
 
 
 def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
-    """On how many runs peaks are counted, of how many."""
+    """Return the number of runs with counted peaks, and of all runs."""
     done = ~runs.failed[which]
     return int((runs.counted[which] & done).sum()), int(done.sum())
 
 
 def _beside(counted: tuple[int, int], threshold: float) -> str:
-    """Return that a share of rails is undecided if its interval holds the threshold, else an empty text."""
+    """Return that a fraction of rails is undecided if its interval holds the threshold, else an empty text."""
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""
 
 
 def _rails(counted: tuple[int, int]) -> str:
-    """On how many rails, with the interval of their share."""
+    """Write on how many rails peaks are counted, with the interval of their fraction."""
     low, high = share_interval(*counted)
     return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
 
@@ -113,7 +113,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """Return the share of rails over stroke and crossover."""
+    """Return the fraction of rails over stroke and crossover."""
     return judged_grid(evidence.experiments.grid)
 
 
@@ -273,7 +273,7 @@ def _sized(peaks: tuple[float, float]) -> bool:
 
 
 def _over_noise(standstill: InPosition) -> str:
-    """At which noises of the force the deviations are as measured."""
+    """Write at which force noises the deviations are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:

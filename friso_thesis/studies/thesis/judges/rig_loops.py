@@ -14,10 +14,10 @@ from friso_thesis.studies.thesis.claims import Evidence, Part, number_text
 from friso_thesis.studies.thesis.reading import about, reading
 
 _HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
-"""Highest setting, crossing that threatens stability (Fig. 22), and the crossing of the free joint (Fig. 23) [Hz]."""
+"""Highest setting, crossing that threatens stability (Fig. 22), and crossing of the free joint (Fig. 23) [Hz]."""
 
 BEYOND = 3.0
-"""Times the crossover from which a peak of the open loop is one of a mode."""
+"""Ratio of a peak's frequency to the crossover from which the peak belongs to a mode."""
 
 ASSUMED = (
     f"Assumed: sample time, encoder and peak force of Sec. 3.5; a delay of {AS_BUILT['drive.delay']}, a current loop "
@@ -27,7 +27,7 @@ ASSUMED = (
 
 
 RAIL = "how friction varies along the rail, which rails these are, the drive's delay"
-"""What is assumed of the rig as built, and not drawn."""
+"""Assumptions about the rig as built that are not drawn."""
 
 
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
@@ -69,7 +69,10 @@ def _further(loops: RigLoops) -> Part:
 
 
 def _peak(loop: MeasuredLoop, low: float) -> tuple[float, float]:
-    """Frequency [Hz] and magnitude of the open loop's largest value above a frequency [Hz]; NaN of one not measured."""
+    """Return frequency [Hz] and magnitude of the open loop's peak above a frequency [Hz].
+
+    Both are NaN for a loop that was not measured.
+    """
     if not loop.measured:
         return np.nan, np.nan
     size = np.abs(loop.response.response) * (loop.response.frequency > low)

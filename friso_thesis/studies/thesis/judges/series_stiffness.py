@@ -17,12 +17,14 @@ PRINTED_STIFFNESS = in_series(K_F, K_J)
 """Eq. 1 as printed."""
 
 PRINTED_SENSITIVITY = (K_J / K_F / (1 + K_J / K_F)) ** 2
-"""Eq. 2 as printed, with eta = K_J/K_F: how the stiffness of both in series changes with that of the friction."""
+"""Eq. 2 as printed, with eta = K_J/K_F.
+
+It gives the change of the series stiffness with that of the friction."""
 
 
 @judges("E1", figure="Eq. 1, 2", needs=(PLANT,))
 def printed_formulas(evidence: Evidence) -> Finding:
-    """Both printed formulas against what follows from the balance of forces, and Eq. 1 against the plant."""
+    """Judge both printed formulas against the balance of forces, and Eq. 1 against the plant."""
     return Finding(
         (
             *judged_formulas(PRINTED_STIFFNESS, PRINTED_SENSITIVITY),

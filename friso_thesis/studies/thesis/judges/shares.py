@@ -17,29 +17,31 @@ if TYPE_CHECKING:
     import xarray as xr
 
 WIDE, NARROW = "F_c 0.5 N", "F_c 1.5 N"
-"""The responses at F_s 4 N with the wide and the narrow gap."""
+"""Names of the responses at F_s 4 N with the wide and the narrow gap."""
 
 STRIBECK_VELOCITY = 1.6e-3
 """Stribeck velocity of Table 2 [m/s]."""
 
 
 TURNING = 0.05
-"""Longest time for which a cart that merely turns about is slower than the Stribeck velocity [s]."""
+"""Longest time [s] below the Stribeck velocity that counts as a mere reversal."""
 
 
 @dataclass(frozen=True)
 class Sticking:
-    """The sticks that end in break-away, each of shape (sticks,): their length [s], the share of the integral action in
-    the force at break-away, and its direction (1 or -1)."""
+    """The sticks that end in break-away, each of shape (sticks,).
+
+    They have a length [s], the fraction of the integral action in the force at break-away, and its direction (1 or -1).
+    """
 
     time: np.ndarray
     integral: np.ndarray
     direction: np.ndarray
 
     def mean(self, values: np.ndarray) -> float:
-        """Mean of the means in the two directions, which weigh the same; NaN if there are not both.
+        """Return the mean of the means in both directions; NaN if one direction is missing.
 
-        Sticks may alternate between long and short: a cycle need not be symmetric.
+        Sticks may alternate between long and short, because a cycle need not be symmetric.
         """
         return (
             float(np.mean([values[self.direction == direction].mean() for direction in (1, -1)]))
@@ -62,7 +64,7 @@ class Sticking:
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
-    """Sticking time and integral share at break-away, at both gaps."""
+    """Judge sticking time, and fraction of the integral action at break-away, at both gaps."""
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     why = (
         ""
@@ -93,7 +95,7 @@ def sticking(response: Response) -> Sticking:
     """Return the sticks of a response that end in a break-away after the time from which peaks
     count.
 
-    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the share of the
+    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the fraction of the
     integral action is taken where the friction force is largest within the stick, before it drops.
     """
     trace = response.trace
@@ -107,8 +109,10 @@ def sticking(response: Response) -> Sticking:
 
 
 def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
-    """First and last sample of each spell below the Stribeck velocity that is longer than a turning about and over
-    before the run ends."""
+    """Return first and last sample of each stick.
+
+    A stick stays below the Stribeck velocity for longer than a reversal, and ends before the run does.
+    """
     slow = np.abs(trace["cart_velocity"].values) < STRIBECK_VELOCITY
     edges = np.flatnonzero(np.diff(slow.astype(int)))
     spells = [(int(a) + 1, int(b)) for a, b in pairwise(edges) if slow[a + 1]]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 EVIDENCE = "thesis.solver"
-"""What ode23s finds (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
+"""Name of the finding on ode23s (`benchmarks/ode23s.py`), which takes 200 000 steps a run."""
 
 CROSSOVERS = (4.0, 8.0, 12.0, 16.0, 20.0)
 """Crossovers [Hz] of runs with the joint locked and free: evenly spread up to where Fig. 11 sees no hunting."""
@@ -29,7 +29,7 @@ STROKES, DAMPINGS = (30, 100, 300), (1, 100, 10_000)
 """Strokes [um] and limiter dampings [N s/m] of more with the joint free, where the limiter is hit: over Fig. 14B."""
 
 AT_REST = 1e-9
-"""Swing [m] up to which none is shown."""
+"""Swing [m] below which a run counts as at rest."""
 
 RTOL, TIGHT = 1e-4, 1e-8
 """The thesis's relative tolerance, and a tight one."""
@@ -53,7 +53,7 @@ def _cases() -> dict[str, dict[str, Any]]:
 
 
 CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(_cases())
-"""The runs: what each changes in the rig."""
+"""Runs by name, with their changes of the rig."""
 
 
 @judges("S323", figure="Sec. 3.2.3, solver")
@@ -64,7 +64,7 @@ def solver_and_largest_step(evidence: Evidence) -> Finding:
 
 
 Counted = tuple[int, float, float]
-"""Peaks counted, swing over the last quarter of the run [m], steps."""
+"""Counted peaks, swing over the last quarter of the run [m], and number of steps."""
 
 
 def _kept(values: Mapping[str, float], name: str) -> Counted:
@@ -127,7 +127,7 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
 
 
 OTHER_SOLVERS = "thesis.other-solvers"
-"""What ode23s, ode15s and ode45 need for the same runs (`benchmarks/ode23s.py`)."""
+"""Name of the finding on ode23s, ode15s and ode45 for equal runs (`benchmarks/ode23s.py`)."""
 
 
 @judges("S323C", figure="Sec. 3.2.3, other solvers")

@@ -17,10 +17,10 @@ from friso_thesis.studies.thesis.reading import reading
 from friso_thesis.studies.thesis.studies import STUDIES
 
 LOW_ALPHA, HIGH_ALPHA = "alpha 0.1", "alpha 0.2"
-"""The responses of the locked rig over the half of the range of alpha in which it hunts."""
+"""Names of the responses of the locked rig at both ends of the range of alpha in which it hunts."""
 
 HEAVIEST = "5.1 kg"
-"""The response of the locked rig with the heaviest mass of Table 3, at which hunting has ended."""
+"""Name of the response of the locked rig with the heaviest mass of Table 3, with which it no longer hunts."""
 
 _ISOLATED = tuple(name for name in STUDIES if name.startswith("isolator"))
 

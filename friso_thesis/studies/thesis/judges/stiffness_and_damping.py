@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _NEEDED = 1e-4
-"""Stroke that the isolator needs with large damping of its limiter [m] (Sec. 4.1)."""
+"""Stroke [m] that the isolator needs with a strongly damped limiter (Sec. 4.1)."""
 
 _SMALL_DAMPING = 1.0
 """Limiter damping below which the stroke is reported for comparison [N s/m]."""
@@ -148,7 +148,7 @@ def _span(values: np.ndarray) -> str:
 
 
 def _rounded(value: float) -> str:
-    """Two digits, without an exponent."""
+    """Write a number to two digits, without an exponent."""
     return f"{float(f'{value:.2g}'):g}"
 
 

@@ -37,10 +37,10 @@ CURVE = (1.0, 3e3)
 """Frequencies [Hz] over which the loops are drawn."""
 
 POINTS = 600
-"""Frequencies of a curve, besides those about resonances."""
+"""Number of frequencies of a curve, besides those around resonances."""
 
 LOWEST, STEPS = 1.0, 61
-"""The first crossover [Hz] of those that are looked at before the end of a range is located, and how many."""
+"""Lowest crossover [Hz] and number of crossovers in the search for the ends of a range."""
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,11 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
-    """See `CrossoverLoops`; the free joint's limiter is touched, since the controller is tuned for all the mass. None
-    where the end of the search comes first, 0 without any such crossover."""
+    """Return the highest crossover [Hz] up to which the loop of the sliding stage crosses 0 dB once.
+
+    A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if the
+    search ends first, and 0 if there is no such crossover.
+    """
     settings = FrequencySettings.current()
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])

@@ -22,10 +22,10 @@ PARASITIC = 300.0
 """Frequency [Hz] at which the thesis finds the parasitic mode (Sec. 3.4.2)."""
 
 VISIBLE = np.log(10) / 20
-"""Height from which a peak of the logarithm of the magnitude counts as a resonance: 1 dB."""
+"""Height, in the logarithm of the magnitude, from which a peak counts as a resonance: 1 dB."""
 
 FINER = 201
-"""Frequencies between the two neighbours of an extreme, among which it is located."""
+"""Frequencies between the neighbours of an extreme, for locating it."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Frequencies [Hz] at which the magnitude has its peaks, or those of its inverse for a negative sign."""
+    """Return the frequencies [Hz] at which the magnitude peaks, or its inverse for a negative sign."""
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))
@@ -108,7 +108,7 @@ def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: in
 
 
 def _mass_line(case: LimitCase) -> float:
-    """In the middle of the mass line [Hz]: between the antiresonance of the parasitic mode and what is below it."""
+    """Return the middle of the mass line [Hz], between the antiresonance of the parasitic mode and lower modes."""
     high = max((f for f in case.antiresonances if f < case.parasitic), default=np.nan)
     low = max((f for f in case.resonances if f < high), default=high / 10)
     return float(np.sqrt(low * high))

@@ -21,10 +21,10 @@ from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.settings import FrequencySettings
 
 SPEEDS = 257
-"""Speeds at which stability is looked at before the ends of its ranges are located."""
+"""Number of speeds at which stability is checked before range ends are located."""
 
 CROSSOVERS = 25
-"""Faster controllers that are tried on a cart that is not stable."""
+"""Number of faster controllers that are tried on an unstable cart."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: fl
     """Return the real part [1/s] of the rightmost pole of the loop,
     with friction linearised at speeds (n,) [m/s].
 
-    The bristles have a share of the deflection that belongs to these speeds in steady state.
+    The bristles have a fraction of the deflection that belongs to these speeds in steady state.
     """
     law = law_of(flat)
     assert law is not None  # the rig has friction

@@ -20,13 +20,13 @@ IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"
 """The masses that the thesis identified (Sec. 4.2.1)."""
 
 FURTHER = 600.0
-"""Where the thesis measured another crossing [Hz] (Sec. 4.2.4)."""
+"""Further crossing of 0 dB that the thesis measured [Hz] (Sec. 4.2.4)."""
 
 AT_HIGHEST: Mapping[str, Any] = {**LOCKED, CROSSOVER: "48 Hz"}
-"""The setting at which it did."""
+"""Setting at which the thesis measured a further crossing."""
 
 LITTLE = "1 N*s/m"
-"""Limiter damping of a contact that hardly loses anything."""
+"""Limiter damping of a contact with hardly any loss."""
 
 
 @dataclass(frozen=True)
