@@ -137,7 +137,7 @@ class SpecFriction(Section):
     static: Annotated[Interval | None, Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")] = None
     coulomb: Annotated[Interval | None, Span(Quantity("N", positive, "1 N"), "0.5 N .. 1 N")] = None
     gap: Annotated[Interval | None, Span(Number(inside_0_1, "0.5"), "0.3 .. 0.85")] = None
-    """The share of the static friction that is lost in sliding, (F_s - F_c)/F_s, instead of `coulomb`."""
+    """Fraction of static friction that is lost in sliding, (F_s - F_c)/F_s, in place of `coulomb`."""
     stribeck_velocity: Annotated[Interval | None, Span(Quantity("m/s", positive, "1.6 mm/s"), "1 mm/s .. 3 mm/s")] = (
         None
     )
@@ -208,8 +208,8 @@ class SpecLeaves(Section):
     materials: Annotated[tuple[Any, ...], OneOrMany(None, 'materials = ["stainless 1.4310"]')]
     stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
     offset: Annotated[Value, Quantity("m", non_negative, "1 mm")] = Value(1e-3, "1 mm")
-    """How far actuator and sensor are off the middle of the width, by which they see the stage turn about the leaves;
-    where the stage file says where they are, that holds."""
+    """Distance of actuator and sensor from mid-width, by which they couple to rotation of the stage about the leaves;
+    places in the stage file take precedence."""
 
     def space(self, name: str) -> tuple[float, float]:
         """Return the least and the largest length, width or spacing [m]; a fixed one is both."""
@@ -238,19 +238,19 @@ class Safety(Section):
     """Factors of safety, and the tolerance of the drive stiffness in production."""
 
     strength: Annotated[float, Number(at_least_1, "1.5")] = 1.5
-    """Yield strength over stress."""
+    """Ratio of yield strength to stress."""
     fatigue: Annotated[float, Number(at_least_1, "1.3")] = 1.3
-    """Stress borne for ever over that at the clamps at full stroke."""
+    """Ratio of fatigue strength to the stress at the clamps at full stroke."""
     buckling: Annotated[float, Number(at_least_1, "3")] = 3.0
-    """Buckling load over load."""
+    """Ratio of buckling load to load."""
     breakaway: Annotated[float, Number(at_least_1, "1.1")] = 1.1
-    """Least static friction over the force of the joint at full stroke."""
+    """Ratio of the least static friction to the joint's force at full stroke."""
     parasitic: Annotated[float, Number(at_least_1, "10")] = 10.0
-    """First interfering parasitic frequency over crossover (thesis, Sec. 4.3.3)."""
+    """Ratio of the first interfering parasitic frequency to the crossover (thesis, Sec. 4.3.3)."""
     hunting: Annotated[float, Number(at_least_1, "1.2")] = 1.2
-    """Crossover over the highest at which a cycle attracts."""
+    """Ratio of the crossover to the highest crossover at which a cycle attracts."""
     stiffness_tolerance: Annotated[float, Number(inside_0_1, "0.1")] = 0.1
-    """Share by which the drive stiffness may be off: the thickness, in its cube, by a third of that."""
+    """Relative tolerance of the drive stiffness; the thickness, which enters cubed, may deviate by a third of it."""
 
 
 _MACHINE = Table(lambda _: SpecMachine, '[machine] crossover_limit = "48 Hz"')

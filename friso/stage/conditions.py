@@ -29,19 +29,19 @@ class Conditions(UncertainSection):
     """Where on its rail, under what load and how warm the guide is: factors on static and Coulomb friction."""
 
     place: Annotated[Value | None, Quantity("m", any_sign, "120 mm")] = None
-    """On the rail, whose factors there apply ([rail]); a drive as built moves along it instead."""
+    """Place on the rail whose friction factors apply ([rail]). A drive as built moves along the rail instead."""
     load: Annotated[float, Number(positive, "1.3")] = 1.0
-    """Normal force on the guide over that at which [friction] was measured."""
+    """Normal force on the guide, relative to that at which [friction] was measured."""
     load_per_acceleration: Annotated[Value, Quantity("s^2/m", non_negative, "0.02 s^2/m")] = Value(0, "0 s^2/m")
-    """By how much the load grows with the acceleration of the reference, as from a centre of mass beside the drive."""
+    """Growth of the load per acceleration of the reference, due for example to a centre of mass beside the drive."""
     load_share: Annotated[float, Number(from_0_to_1, "0.8")] = 1.0
-    """Share of the friction that goes with the normal force; the rest is that of seals and preload."""
+    """Fraction of friction that is proportional to the normal force; the rest is due to seals and preload."""
     cold: Annotated[float, Number(positive, "1.6")] = 1.0
-    """Friction of the cold machine over that of the warm one, of which [friction] tells."""
+    """Friction of the cold machine relative to that of the warm machine, which [friction] describes."""
     running_time: Annotated[Value, Quantity("s", non_negative, "5 min")] = Value(0, "0 s")
-    """For how long the machine has run since it was cold; a motion is short beside the warm-up."""
+    """Time since the machine was cold; a motion is short compared with the warm-up."""
     warm_up_time: Annotated[Value | None, Quantity("s", positive, "20 min")] = None
-    """Time constant with which it gets warm."""
+    """Time constant of the warm-up."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(

@@ -63,7 +63,7 @@ class ContinuousFilter(FilterSection):
     """Base of the filters that are given in continuous time."""
 
     discretisation: FilterRule | None = None
-    """How the drive takes it; default: drive.filter_discretisation, bilinear."""
+    """Rule by which the drive discretises the filter; default: drive.filter_discretisation, bilinear."""
 
 
 FILTERS = Variants("kind")
@@ -81,7 +81,7 @@ class NotchFilter(ContinuousFilter):
     frequency: Annotated[Value, Quantity("Hz", positive, "300 Hz")]
     width: Annotated[Value, Quantity("Hz", positive, "100 Hz")]
     depth: Annotated[float, Number(any_sign, "0.9")] = 1.0
-    """Share of the signal that is taken away at the frequency."""
+    """Fraction of the signal that the notch removes at its frequency."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(("depth",), lambda f: (f["depth"] > 0) & (f["depth"] <= 1), "a depth above 0, 1 at most", "depth = 0.9"),
@@ -103,7 +103,7 @@ class LowPassFilter(ContinuousFilter):
     frequency: Annotated[Value, Quantity("Hz", positive, "1 kHz")]
     order: Literal[1, 2] = 1
     damping_ratio: Annotated[float, Number(positive, "0.7")] = sqrt(0.5)
-    """Damping ratio zeta of a low-pass of the second order."""
+    """Damping ratio zeta of a second-order low-pass."""
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> int:
@@ -172,7 +172,7 @@ class SampledBiquadFilter(FilterSection):
     kind: Literal["sampled_biquad"]
     numerator: Annotated[Values, Several(Number(any_sign, "0.94"), ("0.94", "-1.85", "0.93"), 3, 3)]
     denominator: Annotated[Values, Several(Number(any_sign, "-1.85"), ("-1.85", "0.87"), 2, 2)]
-    """a1 and a2."""
+    """The coefficients a1 and a2."""
     sample_time: Annotated[Value, Quantity("s", positive, "125 us")]
 
     sampled: ClassVar[bool] = True

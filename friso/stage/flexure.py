@@ -71,7 +71,8 @@ class _Leaves(UncertainSection):
     density: Annotated[Value | None, DENSITY] = None
     fatigue: Annotated[Value | None, STRENGTH] = None
     load: Annotated[Value | None, Quantity("N", any_sign, "5 N")] = None
-    """Along the leaves, pressing on them: it makes the drive softer; negative where it pulls, as a hanging stage."""
+    """Compressive load along the leaves, which softens the drive direction; negative for tension, as of a hanging
+    stage."""
     inertia_x: Annotated[Value | None, _INERTIA] = None
     inertia_y: Annotated[Value | None, _INERTIA] = None
     inertia_z: Annotated[Value | None, _INERTIA] = None

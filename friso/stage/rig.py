@@ -98,38 +98,41 @@ class Drive(UncertainSection):
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
     velocity_sample_time: Annotated[Value | None, Quantity("s", positive, "125 us")] = None
     position_sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
-    """Sample times of loops of a cascade that are slower than sample_time: a whole number of samples each."""
+    """Sample times of the loops of a cascade that are slower than sample_time, each a whole multiple of it."""
     velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
-    """Over how many samples the position's difference is taken for its velocity."""
+    """Number of samples over which the position is differenced for the velocity."""
     integral_discretisation: IntegralRule | None = None
-    """Default: a sum that ends with the present sample, by trapezoids for van Dijk's rules."""
+    """Rule of integration; default: a sum that includes the present sample, or trapezoids for van Dijk's rules."""
     filter_discretisation: FilterRule | None = None
-    """Rule for filters, and for the controller's own low-pass (which prewarping leaves as it is); default: bilinear."""
+    """Rule for filters, and for the controller's own low-pass (which prewarping does not change); default: bilinear."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
     """Bandwidth of the current loop, a first-order lag between the controller's force and the actuator's."""
     encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None
     encoder_noise: Annotated[Value | None, Quantity("m", non_negative, "0.5 nm")] = None
-    """RMS, of each sample on its own."""
+    """RMS of the encoder noise, independent from sample to sample."""
     relative_noise: Annotated[Value | None, Quantity("m", non_negative, "30 nm")] = None
-    """RMS, of the sensor between cart and stage."""
+    """RMS of the noise of the sensor between cart and stage."""
     motor_constant_ratio: Annotated[float | None, Number(positive, "1.47")] = None
-    """The motor's true constant over the one that the drive assumes."""
+    """True motor constant relative to the one that the drive assumes."""
     ripple: Annotated[float | None, Number(share, "0.02")] = None
-    """Amplitude of what the force varies by over position, as a share of the force."""
+    """Amplitude of the variation of the force over position, as a fraction of the force."""
     ripple_pitch: Annotated[Value | None, Quantity("m", positive, "24 mm")] = None
     feedforward_mass: Annotated[Value | None, Quantity("kg", non_negative, "1.7 kg")] = None
     feedforward_coulomb: Annotated[Value | None, Quantity("N", non_negative, "1 N")] = None
     feedforward_viscous: Annotated[Value | None, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = None
     integrator_deadband: Annotated[Value | None, Quantity("m", non_negative, "1 um")] = None
-    """The integrator pauses while the error is no larger."""
+    """Largest error at which the integrator pauses."""
     integrator_reset: bool = False
-    """Whether the integrator is reset to 0 where the error changes sign."""
+    """Whether the integrator is reset to 0 when the error changes sign."""
 
     machine_unit: Literal["mm", "cm", "m", "inch", "deg", "rad"] | None = None
+    """Unit of positions in the drive, as stated to friso init --from; friso export needs it."""
     force_per_output: Annotated[Value | None, Quantity("N", positive, "20 N")] = None
+    """Force per unit of the drive's output, as stated to friso init --from; friso export needs it."""
     velocity_per_output: Annotated[Value | None, Quantity("m/s", positive, "5 mm/s")] = None
+    """Velocity per unit of the drive's output, as stated to friso init --from; friso export needs it."""
     travel_per_turn: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
-    """What friso export needs to write parameters of a drive, as it was told to friso init --from."""
+    """Travel of the load per turn of the motor, as stated to friso init --from; friso export needs it."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         _multiple("drive.velocity_sample_time", "drive.sample_time", '"125 us"', '"62.5 us"'),
@@ -181,9 +184,9 @@ class Rail(UncertainSection):
     offset: Annotated[float, Number(above_minus_1, "0.1")] = 0.0
     static_deviation: Annotated[float, Number(share, "0.2")] = 0.0
     coulomb_deviation: Annotated[float, Number(share, "0.2")] = 0.0
-    """Standard deviations of the factors' random fields."""
+    """Standard deviations of the random fields of the friction factors."""
     correlation_length: Annotated[Value | None, Quantity("m", positive, "5 mm")] = None
-    """Places d apart correlate by exp(-(d / correlation_length)^2 / 2)."""
+    """Length over which friction is correlated: places d apart correlate by exp(-(d / correlation_length)^2 / 2)."""
     rolling_pitch: Annotated[Value | None, Quantity("m", positive, "4 mm")] = None
     first_harmonic: Annotated[float, Number(share, "0.1")] = 0.0
     second_harmonic: Annotated[float, Number(share, "0.05")] = 0.0

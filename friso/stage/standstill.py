@@ -20,20 +20,20 @@ class AgainstFriction(UncertainSection):
     integral_limit: Annotated[Value | None, Quantity("N", positive, "2 N")] = None
     """Largest force that each integral holds."""
     integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
-    """Corner below which an integral is a low-pass."""
+    """Corner frequency below which an integral acts as a low-pass."""
     error_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
-    """What the error is made smaller by, to 0 at least, before anything acts on it."""
+    """Amount by which the error is reduced, at most to 0, before anything acts on it."""
     integral_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
     """Error below which integrals pause."""
     integral_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
-    """Larger error at which they go on; the deadband itself where it is left out."""
+    """Larger error at which paused integrals continue; default: the deadband itself."""
     integral_reset: bool | None = None
-    """Whether integrals begin anew where the error changes sign."""
+    """Whether integrals restart when the error changes sign."""
     standstill_window: Annotated[Value | None, Quantity("m", positive, "5 um")] = None
-    """Error below which the gains are multiplied by `standstill_factor`; what integrals hold stays."""
+    """Error below which the gains are multiplied by `standstill_factor`; integrals keep their force."""
     standstill_factor: Annotated[float | None, Number(positive, "0.5")] = None
     stiction_push: Annotated[Value | None, Quantity("N", positive, "1 N")] = None
-    """Force towards the reference while that rests and the error is larger than `stiction_push_window`."""
+    """Force towards the reference while the reference rests and the error exceeds `stiction_push_window`."""
     stiction_push_window: Annotated[Value | None, Quantity("m", non_negative, "2 um")] = None
     dither_amplitude: Annotated[Value | None, Quantity("N", positive, "0.5 N")] = None
     """Amplitude of a sinusoidal force, whose phase is 0 at every corner of the reference."""

@@ -48,7 +48,7 @@ class Actuator(Section):
     """
 
     motor_constant: Annotated[Value, MOTOR_CONSTANT]
-    """Force of an ampere at the load: of a motor with a screw, its torque of an ampere times 2 pi / lead."""
+    """Force per ampere at the load; for a motor with a screw, its torque per ampere times 2 pi / lead."""
 
 
 class Masses(UncertainSection):

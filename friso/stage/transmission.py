@@ -31,17 +31,18 @@ class Transmission(UncertainSection):
     """A screw, belt or gear: what the motor weighs at the load, and the spring that connects them."""
 
     mass: Annotated[Value | None, Quantity("kg", positive, "2 kg")] = None
-    """Mass of all that moves with the motor, taken at the load; or else its `inertia` with `lead` or `ratio`."""
+    """Mass of everything that moves with the motor, reflected to the load; alternatively its `inertia` with `lead` or
+    `ratio`."""
     inertia: Annotated[Value | None, Quantity("kg*m^2", positive, "1.2e-4 kg*m^2")] = None
     """Moment of inertia of motor, coupling and screw, about the motor's axis, on linear and rotary axes alike."""
     lead: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
-    """By how much one turn of the motor moves the load."""
+    """Travel of the load per turn of the motor."""
     ratio: Annotated[float | None, Number(positive, "5")] = None
-    """Turns of the motor for one of the load, of a rotary axis."""
+    """Turns of the motor per turn of the load, on a rotary axis."""
     stiffness: Annotated[Value, Quantity("N/m", positive, "120 N/um")]
     damping: Annotated[Value, Quantity("N*s/m", non_negative, "2e3 N*s/m")]
     backlash: Annotated[Value | None, Quantity("m", non_negative, "5 um")] = None
-    """The whole play, from one flank to the other."""
+    """Total backlash, from flank to flank."""
 
     @model_validator(mode="after")
     def _motor_has_one_mass(self) -> Self:

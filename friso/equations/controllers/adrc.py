@@ -67,11 +67,11 @@ class DisturbanceRejection(ControllerSection):
 
     kind: Literal["adrc"]
     bandwidth: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
-    """Bandwidth of the feedback, w_c/(2 pi): the loop crosses 0 dB above it."""
+    """Bandwidth of the feedback, w_c/(2 pi); the loop crosses 0 dB at a higher frequency."""
     observer_ratio: Annotated[float, Number(at_least_1, "5")] = 5.0
-    """The bandwidth of the observer over that of the feedback: 3 to 10 as a rule (Herbst 2021)."""
+    """Bandwidth of the observer relative to that of the feedback, usually 3 to 10 (Herbst 2021)."""
     tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None
-    """The mass that the observer believes in, 1/b0."""
+    """Mass that the observer assumes, 1/b0."""
 
     bandwidth_key = BANDWIDTH
     bandwidth_name = "bandwidth"

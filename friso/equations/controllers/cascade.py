@@ -64,10 +64,10 @@ class Cascade(ControllerSection):
     velocity_filter: Annotated[Value, Quantity("s", non_negative, "0.2 ms")] = Value(0, "0 s")
     """Time constant of the first-order filter of the measured velocity."""
     velocity_feedforward: Annotated[float, Number(non_negative, "1")] = 0.0
-    """Share of the reference's velocity that goes to the velocity loop."""
+    """Fraction of the reference's velocity that is fed forward to the velocity loop."""
     acceleration_feedforward: Annotated[Value, Quantity("kg", non_negative, "1.7 kg")] = Value(0, "0 kg")
     coulomb_feedforward: Annotated[Value, Quantity("N", non_negative, "1 N")] = Value(0, "0 N")
-    """By the sign of the reference's velocity."""
+    """Force fed forward with the sign of the reference's velocity."""
     viscous_feedforward: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
     jerk_feedforward: Annotated[Value | None, Quantity("kg*s", any_sign, "0.5 g*s")] = None
 

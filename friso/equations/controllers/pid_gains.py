@@ -51,10 +51,11 @@ class PidGains(Pid):
     tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
     derivative_on: Literal["error", "measurement"] = "error"
     viscous_feedforward: Annotated[Value | None, Quantity("N*s/m", any_sign, "6 N*s/m")] = None
-    """As large as `kd`, it makes a derivative of the measurement one of the error."""
+    """Force per velocity of the reference; equal to `kd`, it turns a derivative of the measurement into one of the
+    error."""
     acceleration_feedforward: Annotated[Value | None, Quantity("kg", any_sign, "1.7 kg")] = None
     coulomb_feedforward: Annotated[Value | None, Quantity("N", any_sign, "1 N")] = None
-    """By the sign of the reference's velocity."""
+    """Force fed forward with the sign of the reference's velocity."""
     jerk_feedforward: Annotated[Value | None, Quantity("kg*s", any_sign, "0.5 g*s")] = None
 
     written = "gains"

@@ -69,9 +69,9 @@ class RationalController(ControllerSection):
     """Base of controllers that are transfer functions; a subclass says how its roots are given."""
 
     gain: Annotated[float, Number(positive, "1.0")] = 1.0
-    """By what the force is multiplied."""
+    """Factor on the force."""
     speed: Annotated[float, Number(positive, "1.0")] = 1.0
-    """By what all frequencies of zeros and poles are multiplied."""
+    """Factor on the frequencies of all zeros and poles."""
     sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
     """Time between samples of a transfer function in z; without it, the transfer function is in s."""
 

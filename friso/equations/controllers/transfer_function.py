@@ -43,12 +43,12 @@ class TransferFunction(RationalController):
     kind: Literal["transfer_function"]
     numerator: Annotated[Values | None, Coefficients((2e3, 8e4, 4e5))] = None
     denominator: Annotated[Values | None, Coefficients((1.0, 400.0, 0.0))] = None
-    """Coefficients, the highest power first."""
+    """Coefficients of the denominator, the highest power first."""
     zeros: Annotated[Values | None, Coefficients((-6.0, "-30+10j"), roots=True)] = None
     poles: Annotated[Values | None, Coefficients((0.0, -400.0), roots=True)] = None
-    """In 1/s, or in z; a complex one stands for itself and its conjugate. The gain before them is `gain`."""
+    """Poles in 1/s, or in z; a complex pole includes its conjugate, and `gain` multiplies the whole."""
     sections: Annotated[Rows, _SECTIONS] = Rows()
-    """Factors of the transfer function."""
+    """Sections whose product is the transfer function."""
 
     rules: ClassVar[tuple[Rule, ...]] = RationalController.rules
 

@@ -89,7 +89,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     ] = None
     """Damping of the rate of each element's deflection (micro-damping); without it there is none."""
     attraction: Annotated[Value, Quantity("N/s", positive, "1000 N/s")]
-    """The attraction parameter C: with the time constant s(v)/C the force of what slips follows its level."""
+    """Attraction parameter C: the force of a slipping element follows its level with the time constant s(v)/C."""
     decided_by: ClassVar[Mapping[str, str]] = {
         "": "loops within loops of force over displacement before sliding: whether the inner ones close",
         "friction.attraction": "friction while the speed swings about the Stribeck velocity: how far it lags",

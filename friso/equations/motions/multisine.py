@@ -32,7 +32,7 @@ class Multisine(Motion):
     amplitude: Annotated[Values, Several(Quantity("m", positive, "1 mm"), ("1 mm", "0.5 mm"), 2, _MOST)]
     frequency: Annotated[Values, Several(Quantity("Hz", positive, "1 Hz"), ("1 Hz", "3 Hz"), 2, _MOST)]
     phase: Annotated[Values | None, Several(Quantity("rad", any_sign, "0 deg"), ("0 deg", "90 deg"), 2, _MOST)] = None
-    """At time 0; default: 0."""
+    """Phases at time 0; default: 0."""
 
     rests = False
     rules: ClassVar[tuple[Rule, ...]] = (

@@ -168,15 +168,15 @@ class MoveProfile(Motion):
         Values,
         Several(Quantity("m", not_zero, "5 mm"), ("5 mm", "-5 mm", "20 um"), 1, _MOST, alone=True),
     ]
-    """Distances of the moves, one after the other: forward, or back (negative)."""
+    """Distances of the moves in turn: forward (positive) or back (negative)."""
     velocity: Annotated[Value, Quantity("m/s", positive, "0.5 m/s")]
     acceleration: Annotated[Value, Quantity("m/s^2", positive, "10 m/s^2")]
     jerk: Annotated[Value | None, Quantity("m/s^3", positive, "1000 m/s^3")] = None
     snap: Annotated[Value | None, Quantity("m/s^4", positive, "1e5 m/s^4")] = None
     dwell: Annotated[Value, Quantity("s", non_negative, "0.5 s")]
-    """For how long the reference stands after each move."""
+    """Time for which the reference stands still after each move."""
     duration: Annotated[Value | None, Quantity("s", positive, "20 s")] = None
-    """Default: of all moves with their dwells."""
+    """Duration of the run; default: that of all moves with their dwells."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
