@@ -16,7 +16,7 @@ from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.files import load_changed, load_tables
 from friso.stage.plausible import idle_encoder, implausible_values
-from friso.stage.rig import AS_BUILT
+from friso.stage.rig import AS_BUILT, left_out
 
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 """A stage, the path of a stage file, or its tables as a dictionary."""
@@ -120,13 +120,8 @@ def read_stage(
         LOGGER.warning(
             f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"
         )
-    placed = stage.conditions is not None and stage.conditions.place is not None
-    left = [name for name in leaves_out if getattr(stage, name) and not (name == "rail" and placed)]
-    if left:
-        tables = ", ".join(f"[{name}]" for name in left)
-        bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
-        verb = "are" if len(left) > 1 else "is"
-        LOGGER.warning(f"{tables} {verb} left out: friso simulate and friso rig run the machine as built{bode}")
+    if left := left_out(stage, leaves_out):
+        LOGGER.warning(left)
     return stage
 
 

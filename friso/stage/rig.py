@@ -1,7 +1,7 @@
 """The tables of a stage file that describe the drive as built and what surrounds the machine."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -42,6 +42,17 @@ def is_as_built(stage: Any) -> bool:
     if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
     return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
+
+
+def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
+    """Say which of the `tables` an analysis of the ideal machine omits; empty if the stage has none of them."""
+    placed = stage.conditions is not None and stage.conditions.place is not None
+    left = [name for name in tables if getattr(stage, name) and not (name == "rail" and placed)]
+    if not left:
+        return ""
+    bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
+    listed, verb = ", ".join(f"[{name}]" for name in left), "are" if len(left) > 1 else "is"
+    return f"{listed} {verb} left out: friso simulate and friso rig run the machine as built{bode}"
 
 
 IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]

@@ -46,7 +46,8 @@ def draws_sentences(draws: Draws) -> list[str]:
     """Say what the draws do, in one sentence per case, and which draws were left out."""
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
-    sentences = [*cut, *(f"{label}: {_sentence(name, draws)}" for name, label in case_labels(draws.stage).items())]
+    cases = case_labels(draws.stage).items()
+    sentences = [*cut, *(f"{label}, over the uncertain values: {_sentence(name, draws)}" for name, label in cases)]
     sentences += [text for text in [_narrowed(draws)] if text]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.equations.scaled_friction import static_frictions
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent, plain_factor
-from friso.shown.drawing.prefixes import listed, rounded_down, rounded_up, with_unit
+from friso.shown.drawing.prefixes import listed, range_with_unit, rounded_down, rounded_up
 
 if TYPE_CHECKING:
     from friso.hunting import Case, MarginEnd, ParameterMargin
@@ -55,11 +55,8 @@ def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
 
 
 def margin_ways(margin: ParameterMargin) -> list[str]:
-    """Return the multiples of a parameter beyond which the verdict changes, in words.
-
-    Numbers are rounded to the safe side: hunting never begins sooner, and never ends later, than stated.
-    """
-    return [_way(margin, side, end) for side in (-1, 1) if (end := margin.end(side))]
+    """Return the ranges of multiples of a parameter within which the verdict changes, in words."""
+    return [_way(side, end) for side in (-1, 1) if (end := margin.end(side))]
 
 
 def thin_margins(case: Case) -> list[str]:
@@ -83,17 +80,12 @@ def _side(side: int) -> str:
     return "below" if side < 0 else "above"
 
 
-def _way(margin: ParameterMargin, side: int, end: MarginEnd) -> str:
-    """Say below or above which multiple of a parameter hunting begins or ends.
-
-    The multiple is rounded to the safe side.
-    """
-    outward, inward = (rounded_up, rounded_down) if side > 0 else (rounded_down, rounded_up)
-    if margin.attracts:
-        return f"{_side(side)} {plain_factor(outward(end.other))} times yours"
+def _way(side: int, end: MarginEnd) -> str:
+    """Say between which multiples of a parameter hunting begins or ends; their digits are rounded apart."""
     if end.same == 1:  # how little it takes is not known
-        return f"of {plain_factor(end.other)} times yours already"
-    return f"{_side(side)} {plain_factor(inward(end.same))} times yours"
+        return f"at {plain_factor(end.other)} times yours or {'less' if side > 0 else 'more'}"
+    low, high = sorted((end.same, end.other))
+    return f"between {plain_factor(rounded_down(low))} and {plain_factor(rounded_up(high))} times yours"
 
 
 def _gap(case: Case, margin: ParameterMargin) -> str:
@@ -108,5 +100,6 @@ def _gap(case: Case, margin: ParameterMargin) -> str:
         return ""
     ((static, coulomb),) = pairs.items()
     (end,) = ends
-    factor = end.other if margin.attracts or end.same == 1 else end.same
-    return f", a gap to Coulomb friction of {with_unit(flat[static] * factor - flat[coulomb], 'N')}"
+    low, high = sorted((end.other if end.same == 1 else end.same, end.other))
+    gaps = (flat[static] * factor - flat[coulomb] for factor in (low, high))
+    return f", a gap to Coulomb friction of {range_with_unit(*gaps, 'N')}"

@@ -18,6 +18,7 @@ from friso.shown.cases import shown_cases
 from friso.shown.files import Content
 from friso.shown.motion_words import motion_sentences
 from friso.shown.pages import Report
+from friso.stage.rig import left_out
 from friso.studies.draws import Draws
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def check_html(
         verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
         sentences=[
             *filter(None, [conclusion(cases)]),
+            *(f"{omitted}." for omitted in [left_out(stage)] if omitted),
             *motion_sentences(stage),
             *filter(None, [stage.controller.note(stage.flat())]),
             *([isolator_sentence(isolator)] if isolator else []),
