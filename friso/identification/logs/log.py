@@ -36,7 +36,8 @@ class Log:
     `scalars` are single numbers from the file, by name. `read` lists line by line what was read and how, `warnings`
     what the engineer should know before believing it. `setup` are keys of the stage file that had other values while
     this log was taken ({"joint.stroke": "8 mm"}). `bridged`, shape (n,), marks samples that were lost and are
-    interpolated; None if there are none. `is_excerpt` marks a part of a longer log.
+    interpolated; None if there are none. `is_excerpt` marks a part of a longer log, and `is_integrated` a log whose
+    position is the integral of its velocity.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Log:
     axis: AxisKind = LINEAR
     bridged: np.ndarray | None = None
     is_excerpt: bool = False
+    is_integrated: bool = False
 
     def __contains__(self, role: str) -> bool:
         """Tell whether the log has a role."""
