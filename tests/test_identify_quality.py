@@ -605,7 +605,7 @@ def test_rests_do_not_count_for_a_stage_that_follows_the_log() -> None:
     problem = tracking(flat, whole, whole.segments[0], parameters, 5.0)
     assert problem.counted[1000:7000].mean() > 0.99
     assert problem.counted[8200:].max() == 0
-    assert 0 < problem.passes < 1
+    assert 0 < problem.noise_left(2.0) < 2.0
 
 
 def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:

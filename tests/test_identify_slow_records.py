@@ -107,7 +107,8 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     force = 11.0 * np.sign(np.cos(2 * np.pi * 0.5 * time)) + 20.0 * np.sin(2 * np.pi * 3.1 * time)
     log = record("axis", 1e-3, position=position, force=force)
     inverse = inverse_model(log)
-    stage, problem = made_up(log, inverse).flat(), SimpleNamespace(passes=1.0, closed=False, counted=np.ones(len(time)))
+    stage = made_up(log, inverse).flat()
+    problem = SimpleNamespace(noise_left=lambda noise: noise, closed=False, counted=np.ones(len(time)))
     fit: Any = SimpleNamespace(left=left, problem=problem, stage=stage, explains=lambda noise: False)
     quality = quality_of(log, inverse, fit, 0.05, 0.0)
     assert quality.failed == failed

@@ -8,8 +8,10 @@ import pytest
 
 from friso.errors import LogError
 from friso.identification.contents import log_content
+from friso.identification.logs.checks import clipped_share
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, from_options
+from friso.identification.readings.common import digit_of
 from friso.identification.sources import OpenQuestions, read_all, read_usable
 
 STEP = 1e-3
@@ -111,9 +113,67 @@ def test_rpm_and_amperes(tmp_path: Path) -> None:
     columns = [log["time"], wanted, 300 * log["velocity"], log["force"] / 35]
     path = log_files.write_text(tmp_path / "a.csv", ["time", "rpm_ref", "rpm", "current"], columns)
     offered = options(path)
-    assert {*offered} == {"--unit time=s", "--unit rpm=rpm --axis rotary", "--unit current=A"}
+    assert {*offered} == {"--unit time=s", "--axis rotary", "--unit rpm=rpm", "--unit current=A"}
     (file,) = read_all([path], from_options([], ["time=s", "rpm=rpm", "current=A"], axis="rotary"), tmp_path)
     assert file.source["velocity"].max() == pytest.approx(np.pi / 30 * columns[2].max())  # pyright: ignore
+
+
+def test_a_position_comes_before_its_own_derivative(tmp_path: Path) -> None:
+    """The velocity explains the force better, but the position holds the micrometres in which bristles bend."""
+    log = servo()
+    velocity = np.gradient(log["position"], log["time"])
+    columns = [log["time"], log["position"], velocity, log["force"]]
+    path = log_files.write_text(tmp_path / "a.csv", ["t", "x", "v", "u"], columns)
+    assert {"--map position=x", "--map force=u"} <= {*options(path)}
+
+
+def test_a_force_against_its_motion_is_offered_with_a_negative_scale(tmp_path: Path) -> None:
+    log = steps()
+    path = log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], [log["time"], -log["force"], log["velocity"]])
+    assert '--scale force="-1 N/N"' in options(path)
+
+
+def test_names_of_torques_tell_a_rotary_axis_where_the_motion_has_no_unit(tmp_path: Path) -> None:
+    log = steps()
+    columns = [log["time"], log["velocity"], log["force"]]
+    path = log_files.write_text(tmp_path / "a.csv", ["time", "speed", "torque"], columns)
+    assert {*options(path)} == {"--unit time=s", "--axis rotary", "--unit speed=rad/s", '--unit torque="N*m"'}
+    path = log_files.write_text(tmp_path / "b.csv", ["time", "speed [mm/s]", "torque"], columns)
+    assert "--axis rotary" not in options(path)
+
+
+def test_logs_with_the_same_channels_are_asked_once(tmp_path: Path) -> None:
+    """A log that hardly moves would have the force for the position: most decide."""
+    log = steps()
+    hardly = [log["time"], log["force"], np.random.default_rng(1).normal(0, 1e-3, len(log["time"]))]
+    paths = [log_files.write_text(tmp_path / "a.csv", ["t", "u", "v"], hardly)]
+    for name in ("b", "c"):
+        columns = [log["time"], log["force"], log["velocity"]]
+        paths.append(log_files.write_text(tmp_path / f"{name}.csv", ["t", "u", "v"], columns))
+    with pytest.raises(OpenQuestions) as caught:
+        read_usable(paths, Mapping(), tmp_path)
+    assert {*caught.value.options} == {"--map velocity=v", "--map force=u", "--unit t=s", "--unit v=m/s", "--unit u=N"}
+    assert "and 2 more with the same channels" in caught.value.origin
+
+
+def test_a_kept_role_that_is_wrong_is_mentioned(tmp_path: Path) -> None:
+    log = steps()
+    path = log_files.write_text(
+        tmp_path / "a.csv", ["time [s]", "force [N]", "velocity [m/s]"], [log["time"], log["force"], log["velocity"]]
+    )
+    for channel in ("force", "elsewhere"):
+        path.with_name("a.csv.friso.toml").write_text(f'[roles]\nposition = "{channel}"\n', "utf-8")
+        with pytest.raises(LogError, match=f"as kept in a.csv.friso.toml: position is {channel}"):
+            read_all([path], Mapping(), tmp_path)
+
+
+def test_a_command_that_switches_is_not_clipped() -> None:
+    switched = np.repeat([0.0, 9.0, 0.0, 9.0], 500)
+    assert clipped_share(switched) == 0
+    assert digit_of(switched) == 0
+    wave = 9 * np.sin(np.linspace(0, 20, 2000))
+    assert clipped_share(np.clip(wave, -6, 6)) > 0.3
+    assert digit_of(np.round(wave)) == pytest.approx(1.0)
 
 
 def test_two_readings_are_asked(tmp_path: Path) -> None:

@@ -19,7 +19,12 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.kinds import in_order
 from friso.identification.logs.log import Log
-from friso.identification.output_error.effects import ExplainedResidual, effects_of, explained_by
+from friso.identification.output_error.effects import (
+    ExplainedResidual,
+    beside_all_numbers,
+    effects_of,
+    explained_by,
+)
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 from friso.progress import Progress, silent
@@ -75,13 +80,14 @@ class TriedForces:
 
     `units` are the small sizes at which they are tried. `label` distinguishes hypotheses of one effect, such as the
     width of a play [m]. `searched` is the number of hypotheses from which this one was chosen, because chance explains
-    more of many.
+    more of many. The largest size is at least `least`; a smaller or negative one is another effect.
     """
 
     forces: Sequence[np.ndarray]
     units: Sequence[float]
     label: float = np.nan
     searched: int = 1
+    least: float = -np.inf
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +126,11 @@ class FitCase(FittedCase):
         It may if it leads, or if no doubt leads and no other cause has been named.
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
+
+    def is_small(self, size: float) -> bool:
+        """Tell whether a force along the way of some size [N] is too small to be told: intervals allow for it."""
+        force = self.log["force"][self.log.longest]
+        return size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """Return the case with a finding added, and with the finding's consequences for the fit."""
@@ -256,14 +267,20 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
     if not forces:
         return None
     effects = iter(effects_of(forces, [unit for _, tried in every for unit in tried.units], case.fit))
-    rest, slopes = case.fit.linearised
+    rest, slopes = beside_all_numbers(case.fit)
     for name, tried in every:
         own = [*islice(effects, len(tried.forces))]
         explained = explained_by(slopes, rest, own, case.fit.problem.counted, tried.searched)
-        if explained is not None and (best is None or explained.left < best.explained.left):
+        if explained is None or explained.sizes.max() < tried.least:
+            continue
+        if best is None or explained.left < best.explained.left:
             best = LeadingEffect(name, tried, explained)
-    enough = DoubtSettings.current().power_left_by_an_effect
-    return best if best is not None and best.explained.left <= enough else None
+    if best is None:
+        return None
+    of_all = float(rest @ rest) / float(case.fit.residual @ case.fit.residual)
+    left, moved = 1 - of_all * (1 - best.explained.left), best.explained.moved[[*case.fit.free]]
+    enough = left <= DoubtSettings.current().power_left_by_an_effect
+    return replace(best, explained=replace(best.explained, moved=moved, left=left)) if enough else None
 
 
 def judged_fit(case: FitCase) -> FitCase:

@@ -72,6 +72,16 @@ class FilteredMotion:
     acceleration: np.ndarray
 
 
+def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
+    """Smooth positions [m], (..., n), forward and back below `cutoff` [Hz], where that is below half the sampling."""
+    settings = IdentificationSettings.current()
+    if cutoff >= 0.5 / sample_time:
+        return position
+    sections = butter(settings.order_of_smoothing, 2 * cutoff * sample_time, output="sos")
+    edge = min(3 * settings.order_of_smoothing, position.shape[-1] - 1)
+    return sosfiltfilt(sections, position, axis=-1, padlen=edge)
+
+
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
     """Smooth a position [m], (n,), forward and back below `cutoff` [Hz], and differentiate it.
 
@@ -79,10 +89,7 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
     the acceleration.
     """
     settings = IdentificationSettings.current()
-    smooth, filtered = position, cutoff < 0.5 / sample_time
-    if filtered:
-        sections = butter(settings.order_of_smoothing, 2 * cutoff * sample_time, output="sos")
-        smooth = sosfiltfilt(sections, position, padlen=min(3 * settings.order_of_smoothing, len(position) - 1))
+    smooth, filtered = smoothed(position, sample_time, cutoff), cutoff < 0.5 / sample_time
     if cutoff * sample_time < settings.sampling_of_splines:
         velocity = np.gradient(smooth, sample_time)
         return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
@@ -97,22 +104,23 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
 def bandwidth_of(log: Log) -> float:
     """Return the bandwidth [Hz] of the motion in a log, without reading across gaps.
 
-    It is the frequency below which the acceleration has 95 % of its power, as far as the position stands out of its
-    noise. Raises InputError if it never does.
+    It is the frequency below which the acceleration has 95 % of its power, as far as the position, or the velocity from
+    which it is integrated, stands out of its noise. Raises InputError if it never does.
     """
     settings = IdentificationSettings.current()
+    role, derivatives = ("velocity", 1) if log.is_integrated else ("position", 2)
     lengths = [part.stop - part.start for part in log.segments]
     pieces = min(max(lengths), max(256, sum(lengths) // settings.pieces_of_a_spectrum))
-    whole = [log["position"][part] for part, length in zip(log.segments, lengths, strict=True) if length >= pieces]
+    whole = [log[role][part] for part, length in zip(log.segments, lengths, strict=True) if length >= pieces]
     spectra = [welch(part, 1 / log.sample_time, nperseg=pieces, detrend="linear") for part in whole]
     frequency = spectra[0][0]
     power = np.average([spectrum for _, spectrum in spectra], axis=0, weights=[part.size for part in whole])
     noise = np.median(power[3 * len(power) // 4 :])
     below = np.flatnonzero(power < settings.power_above_noise * noise)
     passband = slice(0, below[0] if below.size else len(power))
-    share = np.cumsum((power - noise)[passband] * frequency[passband] ** 4)
+    share = np.cumsum((power - noise)[passband] * frequency[passband] ** (2 * derivatives))
     if not share.size or not share[-1] > 0:
-        raise InputError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
+        raise InputError(role, "nothing but noise", "a motion that stands out of it", "a larger or faster move")
     return float(frequency[passband][np.searchsorted(share, settings.power_share_of_the_motion * share[-1])])
 
 

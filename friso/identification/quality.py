@@ -83,7 +83,7 @@ def quality_of(
     then if the whole model is clearly better than the inverse model without it.
     """
     settings, case = DoubtSettings.current(), RecordCase(log, inverse, cart_share)
-    flat, left, passed = fit.stage, fit.left, noise * fit.problem.passes
+    flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
     findings = list(raised("record", case))
     plain = Quality(noise, left, passed, inverse.error, whole_error(flat, inverse), tuple(findings))
     if fit.problem.closed and fit.explains(noise):

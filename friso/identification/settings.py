@@ -143,6 +143,14 @@ class DoubtSettings(Settings):
     ratio_of_plays: float = setting(1.4, "")
     """Ratio of successive widths that are tried. At 1.5 times its width a play explains half of it."""
 
+    force_share_of_a_told_effect: float = setting(0.01, "")
+    """Share of the force's standard deviation below which a force along the way widens intervals without a sentence:
+    of sound logs at 500 Hz 0.004 was seen, and a tenth of the friction is 0.02 and more."""
+
+    samples_of_a_crossing: float = setting(5.0, "")
+    """Samples in which a load crosses a play that is tried, on average: of a sound sine at 500 Hz, reversals passed for
+    one that took 2 samples; with 10, plays of 20 um would be missed at 1 kHz."""
+
     bandwidths_of_a_play: float = setting(4.0, "")
     """Bandwidth of the motion for play, over the usual one. At 1 a gap that is crossed in 5 ms is blurred; at 16 noise
     counts."""

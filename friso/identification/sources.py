@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -75,7 +76,7 @@ def read_usable(
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
     files: list[LogFile] = []
-    gaps: list[LogError] = []
+    gaps: dict[tuple[str, ...], list[GapsError]] = {}
     wrong: list[InputError] = []
     everything = [*paths, *others]
     holders = _holders(options, everything) if len(everything) > 1 else {}
@@ -85,14 +86,42 @@ def read_usable(
             file = _read(path, mapping, folder)
             files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
         except GapsError as error:
-            gaps += error.gaps
+            first, *more = error.gaps
+            alike = tuple(channel.name for channel in read_table(path).channels)
+            gaps.setdefault(alike, []).append(GapsError([_mentioning_kept(first, path, mapping, folder), *more]))
         except InputError as error:
-            wrong.append(error)
+            wrong.append(_mentioning_kept(error, path, mapping, folder))
     if gaps:
-        raise OpenQuestions(gaps)
+        raise OpenQuestions([gap for alike in gaps.values() for gap in _asked_once(alike)])
     if wrong and not files:
         raise wrong[0]
     return _recognised_together(files), wrong
+
+
+def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
+    """Return an error about a log, with what was kept of how to read it: that may be wrong."""
+    try:
+        kept = "" if is_frequency_response(path) else (load_mapping(path, folder) or Mapping()).beside(options).words
+    except InputError:
+        kept = ""  # the error says so
+    actual = f"{error.actual} (read as kept in {sidecar(path).name}: {kept}; options override it)"
+    return LogError(error.key, actual if kept else error.actual, error.expected, error.example, error.origin)
+
+
+def _asked_once(alike: Sequence[GapsError]) -> list[LogError]:
+    """Return what is open about logs with the same channels, once, as most of them would have it.
+
+    A log that moves little may suggest other channels for a role than the rest, and options hold for all.
+    """
+    votes = Counter(tuple(text for text in error.options if text.startswith("--map")) for error in alike)
+    maps = votes.most_common(1)[0][0]
+    agreed = [error for error in alike if {*maps} <= {*error.options}]
+    options = Counter(error.options for error in agreed).most_common(1)[0][0]
+    chosen = next(error for error in agreed if error.options == options)
+    if len(alike) == 1:
+        return [*chosen.gaps]
+    more = f" and {len(alike) - 1} more with the same channels"
+    return [LogError(gap.key, gap.actual, gap.expected, gap.example, f"{gap.origin}{more}") for gap in chosen.gaps]
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:

@@ -27,7 +27,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals allow for it; slow passes to and fro over the same way would show it"
     )
     wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    yield RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    named = RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    yield RaisedDoubt(fit=wider) if case.is_small(size) else named
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

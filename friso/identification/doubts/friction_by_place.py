@@ -31,7 +31,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         if case.fit.problem.parameters[number].name == "friction.coulomb":
             further[i] += reach / case.fit.value("friction.coulomb")
     wider = reaching_over(case.fit, further)
-    yield RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    named = RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    yield RaisedDoubt(fit=wider) if case.is_small(size) else named
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

@@ -23,8 +23,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "load-friction":
         return
-    share, (least, most) = float(effect.explained.sizes[0]), settings.shares_of_a_load
-    if effect.explained.left > settings.power_left_by_a_load or not least <= share <= most:
+    share = float(effect.explained.sizes[0])
+    if effect.explained.left > settings.power_left_by_a_load or share > settings.shares_of_a_load[1]:
         return
     words = (
         f"Friction grows with the force of the motor, by {percent(share)} of it, as that of worm gears, belts and "
@@ -39,7 +39,8 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a force against the motion, in proportion to the motor's force."""
     settings = DoubtSettings.current()
     force = case.log["force"][case.log.longest]
-    yield TriedForces([-np.abs(force) * way_of(case)], [settings.share_of_a_tried_load])
+    against, least = -np.abs(force) * way_of(case), settings.shares_of_a_load[0]
+    yield TriedForces([against], [settings.share_of_a_tried_load], least=least)
 
 
 DOUBT = Doubt(

@@ -12,6 +12,7 @@ from friso.identification.doubts.coupling import IMITATED
 from friso.identification.inverse_model import motion
 from friso.identification.output_error.effects import reaching_over
 from friso.identification.output_error.parameters import BRISTLES, MASS
+from friso.identification.readings.common import runs
 from friso.identification.settings import DoubtSettings, IdentificationSettings
 from friso.quantities import percent
 
@@ -27,7 +28,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         return
     shares, width = effect.explained.sizes, effect.tried.label
     share = float(shares.max())
-    if not settings.mass_share_of_a_play <= share <= settings.most_of_a_play:
+    if share > settings.most_of_a_play:
         return
     what = "mass" if share == shares[0] else "friction"
     words = (
@@ -44,7 +45,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that the motor saves while the load is loose, for each width of play.
 
-    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose.
+    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose. A width
+    that the load crosses within a few samples is not tried, because what happens between samples would pass for it.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
     names = [parameter.name for parameter in fit.problem.parameters]
@@ -60,10 +62,14 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     for width, slowing, speed in zip(
         both, slowings, loose_loads(moved.position, moved.velocity, step, both, slowings), strict=True
     ):
+        loose = runs(speed != moved.velocity)
+        if sum(one.stop - one.start for one in loose) < settings.samples_of_a_crossing * len(loose):
+            continue
         acceleration = np.diff(speed, prepend=speed[0]) / step
         lacking = [mass * (moved.acceleration - acceleration)]
         lacking += [friction * (np.sign(moved.velocity) - np.sign(speed))] if slowing else []
-        yield TriedForces(lacking, [settings.mass_share_of_a_tried_play] * len(lacking), float(width), 2 * len(widths))
+        sizes, least = [settings.mass_share_of_a_tried_play] * len(lacking), settings.mass_share_of_a_play
+        yield TriedForces(lacking, sizes, float(width), 2 * len(widths), least)
 
 
 def loose_loads(

@@ -66,7 +66,7 @@ def read_log(
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
         tuple(notes.read), tuple(notes.warnings), dict(mapping.setup), mapping.axis_kind,
-        base.bridged if base.bridged.any() else None,
+        base.bridged if base.bridged.any() else None, is_integrated=by_velocity,
     )  # fmt: skip
 
 

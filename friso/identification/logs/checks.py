@@ -76,14 +76,15 @@ def clipped_share(values: np.ndarray) -> float:
     """Return the fraction of samples in flat tops, which show that a signal is clipped.
 
     A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink (the step before is
-    at least a fifth of the largest step), or hardly ever repeats a value elsewhere.
+    at least a fifth of the largest step), or hardly ever repeats a value elsewhere. A command that switches between two
+    values is not clipped.
     """
     settings = LogSettings.current()
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
         return 0.0
     count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
-    repeats = np.count_nonzero(steps[inside] == 0) > settings.share_of_repeated_values * np.count_nonzero(inside)
+    repeats = np.count_nonzero(steps[inside] == 0) >= settings.share_of_repeated_values * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
         edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
         for start, stop in zip(edges[::2], edges[1::2], strict=True):

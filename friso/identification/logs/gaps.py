@@ -7,16 +7,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from friso.axis import FORCE, ROTARY
+from friso.axis import ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import samples_held
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import guess, option
-from friso.identification.logs.physics import KINDS, MotionReading, is_ramp, leads, motion_readings
+from friso.identification.logs.physics import (
+    KINDS,
+    MotionReading,
+    is_ramp,
+    leads,
+    motion_readings,
+    with_positions_first,
+)
 from friso.identification.logs.roles import (
     MEASURED,
     AssignedRole,
@@ -29,8 +37,8 @@ from friso.identification.logs.roles import (
     words,
 )
 from friso.identification.logs.settings import LogSettings
-from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
-from friso.identification.logs.units import OTHERS, in_si, unit_factor
+from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, turning_names, unit_gap
+from friso.identification.logs.units import OTHERS, unit_factor
 from friso.quantities import quoted
 
 OPTIONAL = ("velocity", "acceleration")
@@ -95,6 +103,7 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     readings = [one for one in motion_readings(candidates("force"), motions) if not _are_alike(one.force, one.motion)]
     if not readings or readings[0].unexplained > settings.share_left_by_a_reading:
         return []
+    readings = with_positions_first(readings)
     most = max(settings.ratio_of_rival_readings * readings[0].unexplained, readings[0].unexplained + 0.01)
     return [reading for reading in readings if reading.unexplained <= most and reading.doubt == readings[0].doubt]
 
@@ -137,11 +146,10 @@ def check_gaps(
         if likely:
             chosen[role] = AssignedRole(role, likely, "", True)
     gaps += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])
-    units = {role: unit_gap(choice, reading) for role, choice in chosen.items()}
-    reference = proposal.chosen.get("reference")
-    if units.get("position") and reference is not None and not reference.channel.unit and "reference" not in units:
-        units["reference"] = unit_gap(reference, reading)
-    gaps += _of_units(units, chosen)
+    reference, place = proposal.chosen.get("reference"), chosen.get("position")
+    if reference is not None and not reference.channel.unit and place is not None and unit_gap(place, reading):
+        chosen.setdefault("reference", reference)
+    gaps += _of_units(reading, chosen, bool(readings) and readings[0].sign < 0)
     if gaps:
         proposed = {role: choice.channel.name for role, choice in chosen.items() if role not in proposal.chosen}
         raise GapsError(gaps, proposed)
@@ -169,17 +177,27 @@ def _by_mechanics(
     return best, f"; {quoted(best.name)} {follows}"
 
 
-def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, AssignedRole]) -> list[LogError]:
-    """Return missing units by role; on a rotary axis a torque needs no scale to newtons."""
-    gaps = {role: gap for role, gap in units.items() if gap is not None}
-    if any(TURNS in gap.example for gap in gaps.values()):
-        turned = ROTARY.unit(FORCE)
-        gaps = {
-            role: gap
-            for role, gap in gaps.items()
-            if role not in chosen or in_si(chosen[role].channel.unit, turned)[1] != turned
-        }
-    return list(gaps.values())
+def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: bool) -> list[LogError]:
+    """Return the gaps of units, which are those of a rotary axis where units or names tell that the axis turns.
+
+    A force that acts `against` the motion that it causes gets a negative scale as its example.
+    """
+    gaps = {role: gap for role, choice in chosen.items() if (gap := unit_gap(choice, reading)) is not None}
+    turning = [gap for gap in gaps.values() if gap.example == TURNS]
+    names = turning_names([*chosen.values()]) if gaps and reading.mapping.axis is None else []
+    if turning or names:
+        guessed = "the kind of axis" + guess(ROTARY.name, "by the names")
+        turning = turning or [LogError("--axis", f"channels {', '.join(names)}", guessed, TURNS, reading.origin)]
+        rotary = replace(reading, mapping=replace(reading.mapping, axis=ROTARY.name))
+        return [*turning, *_of_units(rotary, chosen, against)]
+    force = gaps.get("force")
+    if against and force is not None and not chosen["force"].channel.unit:
+        unit = reading.unit("force")
+        scale = f'--scale force="-1 {unit}/{unit}"'
+        example = force.example.replace("NUMBER", "-NUMBER") if "NUMBER" in force.example else scale
+        actual = f"{force.actual}, and accelerates the mass backward where it is positive"
+        gaps["force"] = LogError("force", actual, force.expected, example, reading.origin)
+    return [*gaps.values()]
 
 
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:

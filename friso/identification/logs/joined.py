@@ -39,6 +39,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
         first.setup,
         first.axis,
         np.concatenate([log.measured(slice(0, log.time.size)) == 0 for log in logs]),
+        is_integrated=any(log.is_integrated for log in logs),
     )
 
 

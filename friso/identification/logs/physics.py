@@ -61,6 +61,32 @@ def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, 
     return sorted(readings, key=lambda one: (one.unexplained > refuted, one.doubt, one.unexplained))
 
 
+def with_positions_first(readings: Sequence[MotionReading]) -> list[MotionReading]:
+    """Return readings with those of positions first whose derivative is the velocity of the best reading.
+
+    The position tells what its derivative tells, and the micrometres in which bristles bend.
+    """
+    best, refuted = readings[0], LogSettings.current().share_left_by_a_reading
+    as_good = [one for one in readings if one.doubt == best.doubt and one.unexplained <= refuted]
+    first = [one for one in as_good if one.force is best.force and _is_integral(one, best)]
+    return [*first, *(one for one in readings if one not in first)]
+
+
+def _is_integral(one: MotionReading, best: MotionReading) -> bool:
+    """Tell whether the motion of a reading is a position, and its derivative the velocity of the best reading."""
+    signals = [_filled(one.motion), _filled(best.motion)]
+    if one.kind != "position" or best.kind != "velocity" or any(signal is None for signal in signals):
+        return False
+    place, speed = (signal for signal in signals if signal is not None)
+    if len(place) != len(speed):
+        return False
+    columns = np.stack([np.cumsum(speed), np.arange(len(speed)), np.ones_like(speed)], axis=1)
+    columns /= np.abs(columns).max(axis=0)
+    solution, *_ = np.linalg.lstsq(columns, place, rcond=None)
+    correlation = np.corrcoef(place - columns[:, 1:] @ solution[1:], columns[:, 0])[0, 1]
+    return bool(correlation > LogSettings.current().correlation_of_a_pair)
+
+
 def is_ramp(channel: Channel) -> bool:
     """Tell whether a channel rises with every sample, as a counter or a clock with jitter does."""
     finite = channel.values[np.isfinite(channel.values)]

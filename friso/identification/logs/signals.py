@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping as Roles
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,6 +27,9 @@ SPEED = ROLES["velocity"]
 
 TURNS = f"--axis {ROTARY.name}"
 """The option for a rotary axis."""
+
+_TURNED = {ROTARY.unit(unit) for unit in ROLES.values()} - {*ROLES.values()}
+"""Units that only a rotary axis has."""
 
 
 @dataclass
@@ -154,9 +158,20 @@ def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
     return bare and not _electric_unit(choice)
 
 
+def turning_names(choices: Sequence[AssignedRole]) -> list[str]:
+    """Return the names that tell of angles or torques, of channels without a unit.
+
+    There are none where a channel of the motion has a unit: that tells by itself whether the axis turns.
+    """
+    has_unit = any(choice.channel.unit and LENGTH in ROLES[choice.role] for choice in choices)
+    bare = [choice.channel.name for choice in choices if not choice.channel.unit and not has_unit]
+    return [name for name in bare if likely_unit(words(name)) in _TURNED]
+
+
 def _electric_unit(choice: AssignedRole) -> str:
     """Return A or V if the name of a channel for a force implies it, else ""."""
-    unit = likely_unit(words(choice.channel.name)) if choice.role == "force" else ""
+    parts = words(choice.channel.name) if choice.role == "force" else []
+    unit = "A" if parts == ["i"] else likely_unit(parts)
     return unit if unit in ("A", "V") else ""
 
 
@@ -165,11 +180,10 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
         usual, travel = _likely_length(choice.channel, wanted)
+        usual = "rpm" if wanted == ROTARY.unit(SPEED) and "rpm" in words(name) else usual
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
         expected = f"a unit convertible to {wanted}"
         example, electric = option("--unit", name, usual), _electric_unit(choice)
-        if wanted == SPEED and "rpm" in words(name):
-            usual, travel, example = "rpm", "", f"{option('--unit', name, 'rpm')} {TURNS}"
         if role == "force":
             scale = f"{wanted}/{electric or 'V'}"
             expected += f", or a scale such as {option('--scale', role, f'35 {scale}')}"

@@ -65,6 +65,20 @@ def explained_by(
     return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest))
 
 
+def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a fit leaves beside all numbers of its model, and the derivatives to these, (n, parameters).
+
+    Numbers that the log does not show were not fitted, and what they would explain, as the Stribeck effect at a
+    reversal, is no effect outside the model.
+    """
+    rest, slopes = fit.problem.linearised(fit.inner, np.ones(len(fit.inner), bool))
+    size = np.linalg.norm(slopes, axis=0)
+    usable = np.isfinite(size) & (size > 0)
+    scaled = slopes[:, usable] / size[usable]
+    solution = np.linalg.lstsq(scaled, -rest, rcond=OutputErrorSettings.current().smallest_singular_value)[0]
+    return rest + scaled @ solution, slopes
+
+
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
     """Return the fit with intervals that reach `further`, shape (free,), each way."""
     return fit.with_deviations(fit.deviation + further / COVERAGE)

@@ -51,7 +51,21 @@ class OutputErrorFit:
         """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
-        return self.left < times * noise * self.problem.passes
+        return self.left < times * self.problem.noise_left(noise)
+
+    @property
+    def bounded(self) -> set[int]:
+        """The fitted numbers that are known well enough to be told: their intervals do not span all that may be."""
+        settings, bounded = OutputErrorSettings.current(), set()
+        for number, deviation in zip(self.free, self.deviation, strict=True):
+            parameter = self.problem.parameters[number]
+            most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
+            bounded |= {number} if COVERAGE * deviation < most else set()
+        return bounded
+
+    def is_noise_of_motion(self, noise: float) -> bool:
+        """Tell whether noise of the motion, which adds up and passes for slow effects, explains all that is left."""
+        return self.problem.shaking[0] > 0 and self.left <= self.problem.noise_left(noise)
 
     @property
     def independent(self) -> float:

@@ -40,7 +40,7 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    if better.left > settings.noise_ratio_of_a_closed_fit * noise * problem.passes or worse.cost < better.cost * (
+    if better.left > settings.noise_ratio_of_a_closed_fit * problem.noise_left(noise) or worse.cost < better.cost * (
         1 + chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
     ):
         return better

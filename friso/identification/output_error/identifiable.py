@@ -95,6 +95,8 @@ def _identifiable_on_log(
     """
     names = [parameter.name for parameter in follows.parameters]
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
+    plain = with_force_settled(with_smoothness_settled(plain), noise)
+    follows = plain.problem
     if not hopeful:
         return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
@@ -105,7 +107,8 @@ def _identifiable_on_log(
     answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
-    if _pays(full, plain) or answer.shown == hopeful:
+    better = _pays(full, plain) and answer.fit.bounded >= plain.bounded and not plain.is_noise_of_motion(noise)
+    if better or answer.shown == hopeful:
         return answer
     if not answer.shown:
         return replace(answer, fit=plain)

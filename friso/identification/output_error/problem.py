@@ -17,7 +17,7 @@ from friso.equations.driven import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.errors import InputError
-from friso.identification.inverse_model import motion
+from friso.identification.inverse_model import motion, smoothed
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -53,7 +53,8 @@ class Problem:
 
     `start` has position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
     leaves out. `unsettled` are other inputs that the log allows, and `sharper` are positions [m], smoothed less and
-    less, that the stage may follow instead.
+    less, that the stage may follow instead. `shaking` [N] is the force with which the guiding controller follows the
+    noise of the position, for the position taken and each sharper one; 0 where it is small beside the force's noise.
     """
 
     flat: Mapping[str, Any]
@@ -66,23 +67,25 @@ class Problem:
     counted: np.ndarray
     unsettled: tuple[Inputs, ...] = ()
     sharper: tuple[np.ndarray, ...] = ()
+    shaking: tuple[float, ...] = (0.0,)
+    cutoffs: tuple[float, ...] = (np.inf,)
 
     @property
     def kernel(self) -> Kernel:
         """The compiled equations of the stage."""
         return kernel(self.form)
 
-    @property
-    def passes(self) -> float:
-        """Return the fraction of the noise of the log's force, RMS, in the residual.
+    def noise_left(self, noise: float) -> float:
+        """Return the RMS [N] of the residual that noise leaves, if the log's force has this `noise` [N].
 
-        In closed loop it is 1; for a stage that follows the log it is the part that the guiding controller passes, (2 w
-        s + w^2) / (s + w)^2.
+        In closed loop it is the noise; for a stage that follows the log it is the part that the guiding controller
+        passes, (2 w s + w^2) / (s + w)^2, and the force with which it follows the noise of the position.
         """
         if self.closed:
-            return 1.0
+            return noise
         omega = 2 * self.flat[KP] / self.flat[KD]
-        return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
+        passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
+        return float(np.hypot(noise * passes, self.shaking[0]))
 
     def held_to(self, level: int) -> Problem:
         """Return the problem with the stage driven along one of the `sharper` positions, by number.
@@ -93,7 +96,9 @@ class Problem:
         held = tuple(replace(inputs, held=one.held) for one in self.unsettled if one.held != self.inputs.held)
         sharper = self.sharper[level + 1 :]
         further = tuple(replace(inputs, reference=reference) for reference in sharper[:1])
-        return replace(self, inputs=inputs, unsettled=(*held, *further), sharper=sharper)
+        shaking, cutoffs = self.shaking[level + 1 :], self.cutoffs[level + 1 :]
+        own = {"inputs": inputs, "sharper": sharper, "shaking": shaking, "cutoffs": cutoffs}
+        return replace(self, unsettled=(*held, *further), **own)
 
     def part(self, samples: slice) -> Problem:
         """Return the problem on a stretch of the samples.
@@ -222,17 +227,12 @@ class Problem:
     def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
         """Return the force [N] of the controller that drives a stage along a log, shape (runs, n).
 
-        It is computed here because the model's outputs take longer.
+        The motion is smoothed like that of the log, so that the rounding of a reversal makes no force.
         """
-        count = runs.states.shape[1]
-        off, slip = (
-            wanted[:count] - runs.states[:, :, place]
-            for wanted, place in (
-                (self.inputs.reference, self.kernel.position),
-                (self.inputs.velocity, self.kernel.velocity),
-            )
-        )
-        return self.flat[KP] * off + self.flat[KD] * slip
+        step = self.inputs.sample_time
+        position = smoothed(runs.states[:, :, self.kernel.position], step, self.cutoffs[0])
+        off = self.inputs.reference[: position.shape[1]] - position
+        return self.flat[KP] * off + self.flat[KD] * np.gradient(off, step, axis=1)
 
 
 def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
@@ -283,16 +283,13 @@ def tracking(
     settings = OutputErrorSettings.current()
     omega = 2 * np.pi * min(bandwidth, settings.bandwidth_of_holding)
     settling, step = settings.time_constants_of_settling / omega, log.sample_time
-    smooth, *sharper = (
-        motion(
-            log["position"][part], log.sample_time, identification_settings.smoothing_bandwidths * times * bandwidth
-        ).position
-        for times in settings.smoothing_steps
-    )
+    cutoffs = [identification_settings.smoothing_bandwidths * times * bandwidth for times in settings.smoothing_steps]
+    smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
     # held from each sample to the next
     held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < settings.sample_time_tolerance
     inputs = Inputs(smooth, log["force"][part], step, held)
     counted = _moving(log["position"][part], smooth, step, settling)
+    counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # what is smoothed lacks the samples behind the end
     if not counted.any():
         actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
         expected = "moves that last longer: is the time, or the position, in another unit?"
@@ -311,7 +308,23 @@ def tracking(
         counted * log.measured(part),
         (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
         tuple(sharper),
+        tuple(2 * mass * omega * _shaking(log, part, cutoff) for cutoff in cutoffs),
+        tuple(cutoffs),
     )
+
+
+def _shaking(log: Log, part: slice, cutoff: float) -> float:
+    """Return the noise [m/s] of the velocity below `cutoff` [Hz] that counts beside the noise of a log's force.
+
+    That of an integrated velocity counts, since it adds up in the position, and that of the position where the force is
+    a command without any noise.
+    """
+    band = min(cutoff, 0.5 / log.sample_time)
+    if log.is_integrated:
+        return float(noise_of(log["velocity"][part]) * np.sqrt(2 * band * log.sample_time))
+    if noise_of(log["force"][part]) > 0:
+        return 0.0
+    return float(noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3))
 
 
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:

@@ -13,6 +13,7 @@ from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.readings.common import digit_of
 from friso.identification.spread import CONFIDENCE
 from friso.intervals import COVERAGE
 from friso.progress import Progress
@@ -72,19 +73,22 @@ def _simulated_logs(
     """Yield problems with simulated logs of the fitted machine.
 
     Their force is that of the log and of the guiding controller, their position is the stage's own, and both have the
-    log's noise.
+    log's noise. A force whose resolution is coarser than its noise is rounded to it.
     """
     settings = OutputErrorSettings.current()
     problem = once.problem
     record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
     measured = log["position"][part]
-    blur = blur_of(measured, problem.inputs.reference)
+    blur, digit = blur_of(measured, problem.inputs.reference), digit_of(log["force"][part])
     for number in range(settings.repetitions_of_a_fit):
         progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
         signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
         force = problem.inputs.force + record.force
-        signals["force"][part] = force + noise * rng.standard_normal(len(measured))
+        rounded = 0 < noise <= digit / np.sqrt(12)
+        signals["force"][part] = (
+            np.round(force / digit) * digit if rounded else force + noise * rng.standard_normal(len(measured))
+        )
         like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
         level = len(like.sharper) - len(problem.sharper)
         like = like.held_to(level - 1) if level else like

@@ -82,7 +82,6 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     """Return why parameters, or keys that follow from them, are not determined."""
-    settings = OutputErrorSettings.current()
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
@@ -90,11 +89,8 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
         for name, parameter in parameters.items()
         if name not in identified.shown and not parameter.core
     } | dict(identified.refuted)
-    for number, deviation in zip(fit.free, fit.deviation, strict=True):
-        parameter = fit.problem.parameters[number]
-        most = settings.widest_logarithm if parameter.logarithmic else (parameter.high - parameter.low) / 2
-        if not COVERAGE * deviation < most:
-            unknown.setdefault(parameter.name, "the log does not bound it")
+    for number in {*fit.free} - fit.bounded:
+        unknown.setdefault(fit.problem.parameters[number].name, "the log does not bound it")
     for name, other in (STRIBECK, STRIBECK[::-1]):
         if name in parameters and other in unknown:
             unknown.setdefault(name, unknown[other])

@@ -175,7 +175,8 @@ def digit_of(signal: np.ndarray) -> float:
     """Return the resolution of a signal, shape (n,).
 
     It is the spacing of the levels at which the signal stays, if these are multiples of one step, which interpolation
-    does not change; else the smallest step.
+    does not change; else the smallest step. A signal that mostly stays at a few levels is a command in steps and has no
+    resolution.
     """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
@@ -187,6 +188,8 @@ def digit_of(signal: np.ndarray) -> float:
         digits = apart / apart.min()
         if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
             return float(apart.min())
+    elif stays.size > steps.size / 2:
+        return 0.0
     real = steps[steps > dust]
     return float(real.min()) if real.size else 0.0
 

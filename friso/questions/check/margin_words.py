@@ -101,5 +101,5 @@ def _gap(case: Case, margin: ParameterMargin) -> str:
     ((static, coulomb),) = pairs.items()
     (end,) = ends
     low, high = sorted((end.other if end.same == 1 else end.same, end.other))
-    gaps = (flat[static] * factor - flat[coulomb] for factor in (low, high))
-    return f", a gap to Coulomb friction of {range_with_unit(*gaps, 'N')}"
+    least, most = (flat[static] * factor - flat[coulomb] for factor in (low, high))
+    return f", a gap to Coulomb friction of {range_with_unit(least, most, 'N')}"
