@@ -123,6 +123,8 @@ def fake_stage(
     return SimpleNamespace(
         name=name,
         source="made up",
+        conditions=None,
+        **dict.fromkeys(("drive", "rail", "cable", "floor")),
         joint=joint,
         controller=SimpleNamespace(
             note=lambda flat: "",

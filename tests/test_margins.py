@@ -114,15 +114,17 @@ def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:
     return FakeCase(stage, None, judgement, static_friction=margin)
 
 
-def test_a_margin_is_told_on_the_safe_side() -> None:
-    """Hunting begins no sooner than is told, and has ended by where it is told to end."""
+def test_a_margin_is_told_with_both_of_its_ends() -> None:
+    """Hunting begins, or ends, within the range that is told; one end alone was up to a tenth off."""
     begins = ParameterMargin(False, None, MarginEnd(1.3149, 1.4, True), (1 / 3, 3.0))
-    assert "above 1.31 times" in margin_sentence("static friction", begins)
+    assert "between 1.31 and 1.4 times" in margin_sentence("static friction", begins)
     ends = ParameterMargin(True, MarginEnd(0.5, 0.4449, True), MarginEnd(1.3, 1.4411, True), (1 / 3, 3.0))
-    assert "below 0.444 times" in margin_sentence("static friction", ends)
-    assert "above 1.45 times" in margin_sentence("static friction", ends)
+    assert "between 0.444 and 0.5 times" in margin_sentence("static friction", ends)
+    assert "between 1.3 and 1.45 times" in margin_sentence("static friction", ends)
     (sentence,) = friction_sentences(made_up_case(begins, settles()))
-    assert "2.94 N" in sentence  # 3 N * 1.3149 - 1 N
+    assert "2.94 to 3.20 N" in sentence  # 3 N times the factors, less 1 N
+    already = ParameterMargin(False, None, MarginEnd(1.0, 1.08, True), (1 / 3, 3.0))
+    assert "at 1.08 times yours or less" in margin_sentence("static friction", already)
 
 
 def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
