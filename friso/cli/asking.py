@@ -127,15 +127,14 @@ def named_as_options(names: Collection[str]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        key, origin = error.key, error.origin
-        if key not in names and origin not in names:
+        key = error.key
+        if key not in names:
             raise
-        option = option_of(key) if key in names else key
+        option = option_of(key)
         example = error.example
         if example.startswith(f"{key}="):
             example = example.replace(f"{key}=", f"{option} ", 1).removesuffix(" True")  # a flag takes no value
-        place = option_of(origin) if origin in names else origin
-        raise type(error)(option, error.actual, error.expected, example, place, error.also) from None
+        raise type(error)(option, error.actual, error.expected, example, error.origin, error.also) from None
 
 
 def option_of(keyword: str) -> str:

@@ -237,6 +237,9 @@ class RemedySettings(Settings):
     window_halvings: int = setting(4, "")
     """Halvings that locate the end of a window, to a sixteenth of a step."""
 
+    window_end_share: float = setting(0.05, "")
+    """Fraction of a window next to its end in which a number is said to lie at that end, where little of it is left."""
+
     surveyed_halvings: int = setting(2, "")
     """Halvings that locate the end of a window where machines begin to hunt. Each costs surveys of all machines."""
 

@@ -240,7 +240,7 @@ def checked_stage(
         try:
             sample = draw(chosen, correlations, draws, seed)
         except InputError as error:
-            raise error if error.origin else error.found_in("draws") from None
+            raise error if error.origin else error.found_in("--draws") from None
     elif chosen.uncertain():
         uncertain = _drawable(chosen, correlations, seed)
     from friso.hunting import check as judged

@@ -254,7 +254,16 @@ def conclusion(comparison: Comparison) -> str:
         *(f"{in_prose(result)} {_number(result, count)}{_cost(result, comparison)}" for result in further),
     ]
     text = "; ".join(brought)
-    return f"{text[0].upper()}{text[1:]}. {_as_is(comparison)}".rstrip()
+    sentences = (f"{text[0].upper()}{text[1:]}.", _too_late(resting), _as_is(comparison))
+    return " ".join(filter(None, sentences))
+
+
+def _too_late(resting: Sequence[OptionResult]) -> str:
+    """Say with which options, of those that bring machines to rest, half of them miss a place of their motion."""
+    late = [result for result in resting if not np.isfinite(result.settling.value)]
+    if not late:
+        return ""
+    return f"With {_names(late)} at least half of them are not in position at the far end before the reference returns."
 
 
 def _number(result: OptionResult, count: int) -> str:

@@ -258,7 +258,8 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
     ends += [(k - 1, k) for k in differ[differ > at][:1] if words[k] in (*ATTRACTED, *_QUIET)]
-    return [f"{in_sentence(axis.key)} {axis.value(low)} to {axis.value(high)}" for low, high in ends]
+    sides = (f"{axis.value(low)} to {axis.value(high)}, {'below' if low < at else 'above'}" for low, high in ends)
+    return [f"{in_sentence(axis.key)} {side} yours" for side in sides]
 
 
 def loop_first(stage: Stage) -> list[str]:

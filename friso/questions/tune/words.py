@@ -494,7 +494,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         "distance": f"{still_settles} in time at {1 / goal.distance:.2f} of its bandwidth: hunting may be too close.",
         "force": f"{settle} take more force than there is.",
         "settle": f"{settle} do so too late.",
-        "bandwidth": f"Only settings above your limit of the bandwidth do all of that{_lowest(points, goal)}.",
+        "bandwidth": f"Only settings above your bandwidth limit meet the rest of the goal{_lowest(points, goal)}.",
     }
     for name, sentence in sentences.items():
         left = left & ~broken[name]
@@ -591,7 +591,10 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     first, last = (number(float(value), unit) for value in ends)
     first = f"{first} (the least tried)" if window.open_below else first
     last = f"{last} (the most tried)" if window.open_above else last
-    return f"{name}: from {first} to {last}"
+    near = RemedySettings.current().window_end_share * (window.high - window.low)
+    gaps = {"lower": window.value - window.low, "upper": window.high - window.value}
+    end, gap = min(gaps.items(), key=lambda item: item[1])
+    return f"{name}: from {first} to {last}{f', set at its {end} end' if gap < near else ''}"
 
 
 def window_lines(tuning: Advice) -> list[str]:
