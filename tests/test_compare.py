@@ -471,6 +471,17 @@ def test_sooner_later_and_alike(made_up: Comparison) -> None:
     assert compare_document(made_up)["options"]["c"]["against_a"]["later"]["probability"] == 0.15
 
 
+def test_a_far_end_that_half_of_the_machines_miss_is_told(made_up: Comparison) -> None:
+    """They rest in the end, but not while the reference stands at the far end: neither settles in time."""
+    late = replace(made_up.results[0], measures=replace(made_up.results[0].measures, settling=np.full(COUNT, np.inf)))
+    on_time, too_late = (
+        " ".join(sentences(replace(made_up, results=results))) for results in (made_up.results, (late,))
+    )
+    assert "far end" not in on_time
+    assert "(a) at least half of them are not in position at the far end" in too_late
+    assert "to come to rest in the end" in too_late
+
+
 def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wording) -> None:
     settled = [
         replace(result, measures=replace(result.measures, settling=np.ones(COUNT))) for result in made_up.results

@@ -58,6 +58,7 @@ from friso.questions.tune.words import (
     size_words,
     slowest_time,
     window_lines,
+    window_words,
 )
 from friso.remedies import method
 from friso.remedies import search as search_module
@@ -77,7 +78,7 @@ from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import BANDWIDTH, of_key
 from friso.remedies.verified import ONE, Performance, RemedyOutcome, _stiffness, missed_parts, unsettled_parts
-from friso.remedies.window import windows
+from friso.remedies.window import VariableWindow, windows
 from friso.shown.drawing import matplotlib_renderer
 from friso.shown.drawing.prefixes import NOTHING, with_unit
 from friso.stage.controllers import as_tuned, controller_of
@@ -1441,6 +1442,14 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     assert unmet_goals(*made_up(400, **some), FORCE_LIMITED) == ()
     assert unmet_goals(*made_up(400, **many), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
+
+
+@pytest.mark.parametrize(("alpha", "end"), [(0.1, "lower"), (0.2, ""), (0.299, "upper")])
+def test_a_number_at_the_end_of_its_window_is_told_as_that(rigid: Stage, alpha: float, end: str) -> None:
+    window = VariableWindow("controller.alpha", 0.1, alpha, 0.3, False, False)
+    words = window_words(window, SimpleNamespace(stage=rigid))  # pyright: ignore[reportArgumentType]
+    assert (f"set at its {end} end" in words) == bool(end)
+    assert ("set at its" in words) == bool(end)
 
 
 def test_without_a_survey_nobody_knows_how_many_machines_meet_the_goal() -> None:

@@ -296,7 +296,8 @@ def _recommendation(comparison: Comparison) -> list[str]:
     joint = [result for result in resting if result.option.kind.joint]
     settings = [result for result in resting if not result.option.kind.joint]
     if any(result is comparison.results[0] for result in settings):
-        return ["These machines need neither a joint nor other settings."]
+        in_the_end = "" if np.isfinite(comparison.results[0].settling.value) else " to come to rest in the end"
+        return [f"These machines need neither a joint nor other settings{in_the_end}."]
     if joint and settings:
         return [
             f"On these machines controller settings do what a joint does: with {_names(settings)} no joint is needed. "

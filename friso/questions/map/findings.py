@@ -258,8 +258,8 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))
     ends = [(k, k + 1) for k in differ[differ < at][-1:] if words[k] in (*ATTRACTED, *_QUIET)]
     ends += [(k - 1, k) for k in differ[differ > at][:1] if words[k] in (*ATTRACTED, *_QUIET)]
-    sides = (f"{axis.value(low)} to {axis.value(high)}, {'below' if low < at else 'above'}" for low, high in ends)
-    return [f"{in_sentence(axis.key)} {side} yours" for side in sides]
+    name, sides = in_sentence(axis.key), ("above", "below")
+    return [f"{name} {axis.value(low)} to {axis.value(high)} ({sides[int(low < at)]} yours)" for low, high in ends]
 
 
 def loop_first(stage: Stage) -> list[str]:
