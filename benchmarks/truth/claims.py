@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.engine.allowance import allowance
 from friso.engine.kernel import kernels
-from friso.hunting import Case, CheckPart, Kick, Swinging, check, needed_kernels
+from friso.hunting import Case, CheckPart, Kick, ParameterMargin, Swinging, check, needed_kernels
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -42,7 +42,8 @@ class Edge:
 class Claim:
     """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named), the
     displacements that are said to start hunting (None: nothing was said), what attracts, as it was surveyed (None: it
-    was not), and why the verdict and the edge are not sure, `doubts`, by "verdict" and "edge"."""
+    was not), why the verdict and the edge are not sure, `doubts`, by "verdict" and "edge", and the margin in static
+    friction (None: none was named)."""
 
     case: str
     stage: Stage
@@ -52,6 +53,7 @@ class Claim:
     kick: Kick | None
     surveyed: Any = None
     doubts: Mapping[str, str] = field(default_factory=dict)
+    friction: ParameterMargin | None = None
 
     @property
     def attracted(self) -> bool:
@@ -113,7 +115,9 @@ def _claim(name: str, case: Case) -> Claim:
     )
     edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet, windows)
     doubts = _doubts(case, sure, edge)
-    return Claim(name, case.stage, verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts)
+    return Claim(
+        name, case.stage, verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts, case.static_friction
+    )
 
 
 def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:
