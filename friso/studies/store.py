@@ -358,7 +358,7 @@ def _let_zarr_finish() -> None:
 
 
 def refuse_other(path: Path, study: Study) -> None:
-    """Raise StoreError if the store at `path` has another study than this one."""
+    """Check that the store at `path` has this study. Raises StoreError if it has another one."""
     with read_store(path) as dataset:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
