@@ -1,1 +1,1 @@
-"""Benchmarks: each is one command, compares side by side in one run, and prints ratios."""
+"""Benchmarks: each is one command that compares alternatives in one run, and prints ratios."""

@@ -1,9 +1,9 @@
-"""How long `friso app` takes from an input event to the painted picture, in Chromium: python -m benchmarks.app.
+"""Time `friso app` in Chromium, from an input event to the painted picture: python -m benchmarks.app.
 
-A slider of the thesis rig is moved step by step; each step waits for the picture. Prints medians and 95th percentiles
-[ms] of the picture, and of the first picture of a map and of the Bode plots from the click on their tabs. Then the
-slider is dragged, a step with every frame that the browser paints: prints the time between frames, and the memory of
-page and server before and after so many drags.
+A slider of the thesis rig is moved step by step; each step waits for the picture. The benchmark prints medians and 95th
+percentiles [ms] for the picture, and for the first picture of a map and of the Bode plots after the click on their
+tabs. Then the slider is dragged, a step with every frame that the browser paints. It prints the time between frames,
+and the memory of page and server before and after the drags.
 """
 
 from __future__ import annotations
@@ -101,12 +101,15 @@ def main() -> None:
 
 
 def _steps(page: Any, place: str, count: int) -> list[float]:
-    """Times [ms] from an input event of the slider to the picture."""
+    """Return the times [ms] from an input event of the slider to the picture."""
     return [page.evaluate(STEP, [place, 480 + k % 80]) for k in range(count)]
 
 
 def _times(page: Any, tab: str, painted: str, count: int) -> list[float]:
-    """Times [ms] from a click on a tab to its picture, each of another machine: answers are kept."""
+    """Return the times [ms] from a click on a tab to its picture.
+
+    Each click is for another machine, because answers are kept.
+    """
     wait = """async ([tab, painted]) => { const begun = performance.now();
       document.getElementById(`tab-${tab}`).click();
       while (!document.querySelector(painted)) await new Promise(requestAnimationFrame);
@@ -122,8 +125,10 @@ def _times(page: Any, tab: str, painted: str, count: int) -> list[float]:
 
 
 def _drag(page: Any, server: int, count: int) -> None:
-    """Print what a drag of so many steps does to frames and memory; a tenth of them comes first, so that all is
-    loaded."""
+    """Print what a drag of `count` steps does to frames and memory.
+
+    A tenth of the steps comes first, so that everything is loaded.
+    """
     tool = page.context.new_cdp_session(page)
 
     def megabytes() -> tuple[float, float]:

@@ -1,9 +1,9 @@
-"""Reference numbers of the equations: they change when the physics does, not when the code is rearranged.
+"""Reference numbers of the equations: they change with the physics, not when code is rearranged.
 
-A few stages that between them use every friction law, joint and controller are followed through the declared
-equations from rest, by the classical Runge-Kutta method with a fixed step in plain Python. What is kept are outputs
-over time, which depend neither on the names nor on the order of states or files, nor on the solver. Evidence carries
-the revision of the equations it was computed with (`friso.evidence`), and a revision is such a set of numbers.
+A few stages that between them use every friction law, joint and controller are followed through the declared equations
+from rest, by the classical Runge-Kutta method with a fixed step in plain Python. Outputs over time are stored, which
+depend neither on the names nor on the order of states or files, nor on the solver. Evidence states the revision of the
+equations it was computed with (`friso.evidence`), and a revision is such a set of numbers.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ STAGES: Mapping[str, Stage] = {
 }
 
 BUILT = v.stage(FAST, friction=v.lugre(2), joint=v.free(), controller=v.van_dijk("60 Hz", v.limit("60 N")))
-"""The stage whose drive is as built."""
+"""The stage with a real drive."""
 
 Flat = Mapping[str, Any]
 
 
 @cache
 def reference_numbers() -> dict[str, dict[str, list[float]]]:
-    """Outputs [SI] of each stage at the instants kept, to 12 digits."""
+    """Return the outputs [SI] of each stage at the stored instants, to 12 digits."""
     numbers = {}
     for name, stage in STAGES.items():
         flat = stage.flat()
@@ -80,7 +80,10 @@ def reference_numbers() -> dict[str, dict[str, list[float]]]:
 
 
 def differ(numbers: Mapping[str, Mapping[str, list[float]]], tolerance: float = 1e-7) -> list[str]:
-    """Stages and outputs for which the equations now give other numbers, by more than a share of the largest."""
+    """Return the stages and outputs that the equations now give differently.
+
+    A difference counts if it exceeds a share of the largest number.
+    """
     now = reference_numbers()
     return [
         f"{stage}: {output}"
@@ -91,7 +94,10 @@ def differ(numbers: Mapping[str, Mapping[str, list[float]]], tolerance: float = 
 
 
 def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
-    """Outputs of a run from rest, whose flags of kinks follow their surfaces at every stage of the method."""
+    """Return the outputs of a run from rest.
+
+    Flags of kinks follow their surfaces at every stage of the method.
+    """
     names = [str(parameter) for parameter in model.parameters]
     values = {**flat, "motion.size": float(motion.size(flat))}
     numbers = [float(values[name]) for name in names]
@@ -139,7 +145,7 @@ def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
 
 
 def _neutral(model: Model) -> list[float]:
-    """What a clock looks up: factors of friction and motor other than 1, and an injected force and a moving floor."""
+    """Return table values for a clock: factors of friction and motor other than 1, a force, a moving floor."""
     if model.clock is None:
         return []
     return [0.9 + 0.05 * k for k in range(len(model.clock.places))] + [0.1] * len(model.clock.times)

@@ -1,7 +1,8 @@
-"""Size of the code: `python -m benchmarks.code [PACKAGE ...]`, by default friso, friso_thesis and two anchors.
+"""Measure the size of the code: `python -m benchmarks.code [PACKAGE ...]`.
 
-A line of code has a token of its own: docstrings, comments and blank lines are none. Prose are docstrings and comments.
-The anchors, python-control and xarray, are counted as installed, with the same rules.
+Default packages are friso, friso_thesis and two anchors. A line of code has a token of its own: docstrings, comments
+and blank lines do not count. Prose is docstrings and comments. The anchors, python-control and xarray, are counted as
+installed, with the same rules.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tok
 
 
 class LineCount(NamedTuple):
-    """Lines of modules: all of them, those with code, and those with prose."""
+    """Lines of modules: all lines, lines with code, and lines with prose."""
 
     lines: int
     code: int
@@ -43,7 +44,7 @@ def count(source: str) -> LineCount:
 
 
 def _docstrings(tree: ast.Module) -> Iterator[tuple[int, int]]:
-    """First and last line of each text that stands as a statement, as docstrings do."""
+    """Yield the first and last line of each text that stands as a statement, as docstrings do."""
     for node in ast.walk(tree):
         for statement in getattr(node, "body", []) if isinstance(getattr(node, "body", None), list) else []:
             value = statement.value if isinstance(statement, ast.Expr) else None
@@ -52,7 +53,7 @@ def _docstrings(tree: ast.Module) -> Iterator[tuple[int, int]]:
 
 
 def of_package(package: str) -> dict[str, LineCount]:
-    """Count the modules of an installed package, by its rooms; tests that it holds are left out."""
+    """Count the modules of an installed package, by its rooms, without its tests."""
     spec = find_spec(package)
     if spec is None or spec.origin is None:
         raise SystemExit(f"{package} is not installed")

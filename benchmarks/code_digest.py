@@ -1,7 +1,7 @@
-"""What modules compute, as a digest: their syntax, without what a reader alone sees.
+"""Compute a digest of what modules compute: their syntax, without parts for readers alone.
 
 Comments, docstrings, sentences, annotations, imports and the names that a module gives to its own values do not count,
-so that a change of words leaves the digest as it is; a number, a condition or another function called does not.
+so that a change of words leaves the digest unchanged. Another number, condition or called function changes it.
 """
 
 from __future__ import annotations
@@ -15,15 +15,17 @@ import friso
 
 PACKAGE = Path(friso.__file__).parent
 DIGITS = 12
-"""Digits of a digest on file."""
+"""Number of digits of a stored digest."""
 
 READ_ALONE = ast.Import | ast.ImportFrom
 ANNOTATED = ("annotation", "returns", "type_comment", "type_params", "kind", "ctx")
 
 
 def code_digest(places: Sequence[str]) -> str:
-    """A digest of what the modules in some folders and files compute, paths from the package friso; empty without
-    any."""
+    """Return a digest of what the modules in some folders and files compute; "" for none.
+
+    Paths start from the package friso.
+    """
     if not places:
         return ""
     code = hashlib.sha256()
@@ -33,7 +35,7 @@ def code_digest(places: Sequence[str]) -> str:
 
 
 def computed(source: str) -> str:
-    """The syntax of a module, its own names as numbers in the order in which they occur."""
+    """Return the syntax of a module, with its own names replaced by numbers in order of occurrence."""
     tree = ast.parse(source)
     own = {name for node in ast.walk(tree) for name in _bound(node)}
     numbers: dict[str, str] = {}
@@ -59,7 +61,7 @@ def computed(source: str) -> str:
 
 
 def _bound(node: ast.AST) -> Iterator[str]:
-    """Names that a node of the syntax gives."""
+    """Yield the names that a node of the syntax defines."""
     if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
         yield node.id
     elif isinstance(node, ast.arg):
@@ -69,7 +71,7 @@ def _bound(node: ast.AST) -> Iterator[str]:
 
 
 def _prose(part: object) -> bool:
-    """Whether a statement says something to readers alone: an import, a docstring, a declaration of a type."""
+    """Tell whether a statement is for readers alone: an import, a docstring, a declaration of a type."""
     if isinstance(part, ast.AnnAssign) and part.value is None:
         return True
     docstring = isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant)
@@ -77,7 +79,7 @@ def _prose(part: object) -> bool:
 
 
 def _files(place: Path) -> Iterable[Path]:
-    """Raises FileNotFoundError for a place that does not exist."""
+    """Return the Python files at a place. Raises FileNotFoundError if the place does not exist."""
     if not place.exists():
         raise FileNotFoundError(place)
     return place.rglob("*.py") if place.is_dir() else [place]

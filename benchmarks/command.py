@@ -1,5 +1,8 @@
-"""What the user waits for and needs: by ``python -m benchmarks.command`` the times of the README's commands, each in a
-fresh process; for `benchmarks.engine`, `friso check` and the memory of a large sweep."""
+"""Measure what a user waits for: ``python -m benchmarks.command``.
+
+It prints the times of the README's commands, each in a fresh process. `benchmarks.engine` uses it for `friso check` and
+the memory of a large sweep.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ START = "from friso.cli import main; main()"
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "speed.md"
 PATIENCE = 60.0
-"""Time [s] after which a command is not run once more."""
+"""Time [s] after which a command is not repeated any more."""
 
 LOCKED = "--set joint.locked=true"
 CROSSOVER = '--x controller.crossover="1 Hz..40 Hz"'
@@ -50,7 +53,7 @@ COMMANDS: dict[str, float | None] = {
     "logs {log}": None,
     "identify {log} --stage {servo} --out identified": None,
 }
-"""The README's commands, and others with a goal: the wall time wanted of each, warm [s] (None: no goal)."""
+"""The README's commands and others with a goal, each with the wanted wall time, warm [s] (None: no goal)."""
 
 PLACES = {
     "rig": "examples/thesis_rig.toml",
@@ -90,7 +93,7 @@ print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 
 @dataclass(frozen=True)
 class Timed:
-    """A command as it is typed, and its wall and CPU times [s]: with an empty cache, and one for each warm run."""
+    """A command as typed, with its wall and CPU times [s]: first with an empty cache, then for each warm run."""
 
     command: str
     wanted: float | None
@@ -100,7 +103,7 @@ class Timed:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """A row of the table."""
+        """Return a row of the table."""
         wanted = "" if self.wanted is None else f"{self.wanted:g}"
         times = [f"{time:.1f}" for time in (min(self.wall), statistics.median(self.wall), statistics.median(self.cpu))]
         return (f"`friso {self.command}`", f"{self.cold:.1f}", *times, str(len(self.wall)), wanted)
@@ -110,7 +113,7 @@ HEAD = ("command", "cold", "warm, least", "median", "CPU, median", "runs", "want
 
 
 def time_command(command: str, wanted: float | None, repetitions: int) -> Timed:
-    """Run a command with an empty cache, and then again and again, in a folder of its own."""
+    """Run a command with an empty cache, and then repeatedly, in a folder of its own."""
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
         places = {name: str(ROOT / place) for name, place in PLACES.items()}
         if "{log}" in command:
@@ -120,7 +123,7 @@ def time_command(command: str, wanted: float | None, repetitions: int) -> Timed:
         walls: list[float] = []
         cpus: list[float] = []
         while len(walls) < 2 or (len(walls) <= repetitions and sum(walls) < PATIENCE):
-            run_in = Path(folder, str(len(walls)))  # what an earlier run has written would be gone on with
+            run_in = Path(folder, str(len(walls)))  # output of an earlier run would be continued
             run_in.mkdir()
             wall, cpu = _timed(command.format(**places), Path(folder, "cache"), run_in)
             walls.append(wall)
@@ -129,7 +132,7 @@ def time_command(command: str, wanted: float | None, repetitions: int) -> Timed:
 
 
 def _timed(command: str, cache: Path, folder: Path) -> tuple[float, float]:
-    """Wall and CPU time [s] of a command that is run in a folder."""
+    """Return wall and CPU time [s] of a command that is run in a folder."""
     environment = {**os.environ, "FRISO_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)}
     arguments = [sys.executable, "-c", START, *shlex.split(command)]
     before, start = os.times(), time.perf_counter()
@@ -141,7 +144,7 @@ def _timed(command: str, cache: Path, folder: Path) -> tuple[float, float]:
 
 
 def page(timed: list[Timed], machine: str) -> str:
-    """docs/speed.md."""
+    """Return the text of docs/speed.md."""
     rows = "\n".join(f"| {' | '.join(item.row)} |" for item in timed)
     return f"""# Speed
 
@@ -174,12 +177,12 @@ def main() -> None:
     for command, goal in wanted.items():
         timed.append(time_command(command, goal, chosen.runs))
         print_table(HEAD, [timed[-1].row])
-        if chosen.write:  # of what there is, should it be interrupted
+        if chosen.write:  # with the commands measured so far, in case of an interruption
             PAGE.write_text(page(timed, measured_on), encoding="utf-8")
 
 
 def _check(cache: Path, *options: str) -> tuple[float, str]:
-    """Wall time [s] of one `friso check` and its standard error."""
+    """Return the wall time [s] of one `friso check` and its standard error."""
     processes: list[subprocess.CompletedProcess[str]] = []
     command = [sys.executable, *options, "-c", START, "check", str(FILE)]
     environment = {**os.environ, "FRISO_CACHE_DIR": str(cache)}
@@ -192,7 +195,10 @@ def _check(cache: Path, *options: str) -> tuple[float, str]:
 
 
 def _import_seconds(cache: Path) -> float:
-    """Time spent in imports during one `friso check`, by -X importtime (which itself adds a little) [s]."""
+    """Return the time [s] spent in imports during one `friso check`, by -X importtime.
+
+    That option itself adds a little.
+    """
     _, errors = _check(cache, "-X", "importtime")
     return sum(int(us) for us in re.findall(r"^import time:\s+(\d+) \|", errors, re.MULTILINE)) * 1e-6
 
@@ -215,7 +221,7 @@ def run_check(repetitions: int) -> list[Goal]:
 
 
 def run_memory() -> list[Goal]:
-    """Peak memory of a sweep of 1e5 runs without traces, in a process of its own."""
+    """Measure the peak memory of a sweep of 1e5 runs without traces, in a process of its own."""
     root = Path(__file__).parents[1]
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as cache:
         environment = {**os.environ, "FRISO_CACHE_DIR": cache}

@@ -1,7 +1,7 @@
-"""friso's declared equations, compiled for solvers that take a right-hand side and a Jacobian.
+"""Compile friso's declared equations for solvers that take a right-hand side and a Jacobian.
 
 The numbers of the rig are written into the code, common subexpressions are shared, and Numba compiles it with fast
-arithmetic: as much as anyone can do for a solver that calls back. Kinks are evaluated at every call.
+arithmetic. More cannot be done for a solver that calls back. Kinks are evaluated at every call.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Compiled:
 
 
 def compile_equations(rig: Rig) -> Compiled:
-    """The equations of a rig, compiled."""
+    """Compile the equations of a rig."""
     model = assemble(structure(rig.flat))
     values = {sp.Symbol(name, real=True): sp.Float(value) for name, value in rig.parameters.items()}
     names = {symbol: sp.Symbol(f"x{i}", real=True) for i, symbol in enumerate(model.symbols)}
@@ -77,7 +77,7 @@ def compile_equations(rig: Rig) -> Compiled:
 
 
 def _function(name: str, n: int, surfaces: Iterable[sp.Expr], targets: Mapping[str, sp.Expr]) -> Any:
-    """A compiled function that fills `targets`."""
+    """Return a compiled function that fills `targets`."""
     lines = [*_LOOK_UP, *(f"x{i} = x[{i}]" for i in range(n))]
     lines += [f"beyond{k} = 1.0 if {sp.pycode(s)} > 0.0 else 0.0" for k, s in enumerate(surfaces)]
     shared, reduced = sp.cse(list(targets.values()), symbols=sp.numbered_symbols("w"), order="none")

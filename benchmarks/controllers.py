@@ -1,7 +1,7 @@
-"""What a controller costs: `python -m benchmarks.controllers`.
+"""Measure what a controller costs: `python -m benchmarks.controllers`.
 
-Time of a step per state of a rigid stage with a cascade and four biquads, over that with a PID, on one core, side by
-side: stages at random crossovers, so that lanes differ.
+It compares the time of a step per state of a rigid stage with a cascade and four biquads to that with a PID, on one
+core, side by side. Stages have random crossovers, so that lanes differ.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from friso.equations.structure import structure
 from friso.stage import Stage, loads
 
 RUNS, ROUNDS = 512, 7
-"""Stages of a batch, and batches of each controller, in turns."""
+"""Stages of a batch, and number of batches for each controller, in turns."""
 
 LIMIT = 2.0
-"""What the ratio may be."""
+"""Largest ratio allowed."""
 
 AXIS = """
 [masses]
@@ -75,7 +75,7 @@ def main() -> None:
 
 
 def _step_per_state(stage: Stage) -> float:
-    """Time [s] of an attempted step per state on one core."""
+    """Return the time [s] of an attempted step per state on one core."""
     flat = {**stage.flat(), "masses.stage": np.random.default_rng(1).uniform(1.5, 1.9, RUNS)}
     shape = kernel(structure(stage.flat()))
     start, steps = perf_counter(), 0.0

@@ -1,7 +1,7 @@
-"""Hunting cycles, verdicts and boundaries: `python -m benchmarks.cycle [--only verdict|curve|map|accuracy]`.
+"""Time hunting cycles, verdicts and boundaries: `python -m benchmarks.cycle`.
 
-The verdict on the thesis rig with its cycle, what starts hunting, continued curves, maps of the multiplier, and the
-same numbers at two tolerances.
+`--only verdict|curve|map|accuracy` chooses a part. Parts are the verdict on the thesis rig with its cycle, starts of
+hunting, continued curves, maps of the multiplier, and equal numbers at two tolerances.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def stage_of(changes: dict[str, Any]) -> Stage:
 
 
 def run_verdict(repetitions: int) -> list[Goal]:
-    """Cycle, multipliers and return map of a stage; and what starts hunting, where its cycle attracts."""
+    """Time cycle, multipliers and return map of a stage, and the starts of hunting if its cycle attracts."""
     rows, cycles, rests = [], [], []
     for name, changes in CASES.items():
         stage = stage_of(changes)
@@ -74,7 +74,7 @@ def _what_starts(stage: Stage) -> None:
 
 
 def run_curve(repetitions: int) -> list[Goal]:
-    """All curves in a plane, and what 50 points of them take."""
+    """Time all curves in a plane, and 50 points of them."""
     rows, goals = [], []
     for name, (changes, axes) in CURVES.items():
         stage = stage_of(changes)
@@ -100,7 +100,7 @@ def _keep(plane: Any) -> None:
 
 
 def run_map(repetitions: int) -> list[Goal]:
-    """Maps of the multiplier, 41 x 41."""
+    """Time maps of the multiplier, 41 x 41."""
     rows, goals = [], []
     for name, (changes, axes) in MAPS.items():
         stage, metrics = stage_of(changes), ["multiplier", "amplitude", "cycle_period"]
@@ -113,7 +113,7 @@ def run_map(repetitions: int) -> list[Goal]:
 
 
 def run_accuracy() -> list[Goal]:
-    """Period, amplitude and multiplier at the tolerance used against a hundredth of it."""
+    """Compare period, amplitude and multiplier at the usual tolerance with those at a hundredth of it."""
     rows, goals = [], []
     for name, changes in {**CASES, "locked, 4 Hz": {**LOCKED, "controller.crossover": "4 Hz"}}.items():
         stages = Ensemble.held(stage_of(changes).flat(), 1)

@@ -1,4 +1,4 @@
-"""Describing functions against simulations: the tables of docs/evidence/describing.md, printed in three minutes."""
+"""Compare describing functions with simulations: the tables of docs/evidence/describing.md, in three minutes."""
 
 from __future__ import annotations
 

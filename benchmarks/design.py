@@ -1,7 +1,7 @@
-"""Leaf springs and the design method: `python -m benchmarks.design`.
+"""Time leaf springs and the design method: `python -m benchmarks.design`.
 
-The closed forms for one geometry and for a million at once, the beam model for one; and a whole design run with its
-verification, step by step, once its kernels are compiled.
+It times the closed forms for one geometry and for a million at once, and the beam model for one geometry. Then a whole
+design run with its verification is timed, step by step, once its kernels are compiled.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ STROKE = 1e-3
 
 
 def many(mechanism: Mechanism, count: int) -> Mechanism:
-    """Mechanisms with lengths, widths and thicknesses drawn about one."""
+    """Return mechanisms with lengths, widths and thicknesses drawn around one mechanism."""
     draw = np.random.default_rng(0).uniform(0.5, 1.5, (3, count))
     sizes = {
         name: getattr(mechanism, name) * factor
@@ -40,7 +40,7 @@ def many(mechanism: Mechanism, count: int) -> Mechanism:
 
 
 def all_figures(mechanism: Mechanism) -> None:
-    """What a search looks at."""
+    """Compute all numbers that a search uses."""
     for form in (closed_forms.drive_stiffness, closed_forms.buckling_load):
         form(mechanism)
     for deflected in (closed_forms.max_stress, closed_forms.support_x, closed_forms.support_y):
@@ -49,7 +49,7 @@ def all_figures(mechanism: Mechanism) -> None:
 
 
 def steps() -> tuple[list[tuple[str, float]], float]:
-    """The steps of a design run with their times [s], and the time of the whole."""
+    """Return the steps of a design run with their times [s], and the total time."""
     stage, spec = friso.load(EXAMPLES / "thesis_rig.toml"), load_spec(EXAMPLES / "specs" / "thesis.toml")
     reported: list[tuple[str, float]] = []
     start = time.perf_counter()

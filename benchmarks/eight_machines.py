@@ -1,9 +1,10 @@
-"""Settings of `friso tune` on fresh machines by independent equations: `python -m benchmarks.eight_machines FILE`.
+"""Test settings of `friso tune` on fresh machines by independent equations.
 
-Eight kinds of machine are tuned. Each setting that works is tried on machines that nothing was tuned for, by the
-equations of `tests/plain.py` (the observer of disturbance rejection and the screw with its play by those below) and by
-SciPy's LSODA. A row for each machine and move goes to FILE as one line of JSON, so that a run may be continued; the
-table by size of move is printed in the end. `--only NAME ...` chooses machines, `--machines N` how many are tried.
+`python -m benchmarks.eight_machines FILE` tunes eight kinds of machine. Each setting that works is tried on machines
+for which nothing was tuned, by the equations of `tests/plain.py` (this module has the observer of disturbance rejection
+and the screw with its play) and by SciPy's LSODA. A row for each machine and move goes to FILE as one line of JSON, so
+that a run may be continued; the table by size of move is printed at the end. `--only NAME ...` chooses machines,
+`--machines N` sets how many are tried.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import plain  # noqa: E402
 
 FRESH_SEED, MOST, LIMIT = 9001, 100, 25.0
-"""Seed and number of the fresh machines, and the limit of the bandwidth [Hz] where a machine has no other."""
+"""Seed and number of the fresh machines, and the limit of the bandwidth [Hz] for machines without another limit."""
 
 SIZES = (0.0, 1e-4, 1e-3, np.inf)
 """Edges of the classes of moves [m, rad]."""
@@ -101,7 +102,10 @@ def by_hand(flat: Mapping[str, Any]) -> tuple[np.ndarray, Rates, int]:
 
 
 def _observer(flat: Mapping[str, Any], names: list[str]) -> Rates:
-    """Return the rates of a machine under Gao's extended state observer of the error, with its own three states."""
+    """Return the rates of a machine under Gao's extended state observer of the error.
+
+    The observer has three states of its own.
+    """
     feedback = 2 * pi * flat["controller.bandwidth"]
     observer, mass = flat["controller.observer_ratio"] * feedback, flat["controller.tuned_mass"]
     machine = plain.rates({**flat, "controller.kind": "pid", **NO_GAINS}, [*names, "integral"])
@@ -160,7 +164,10 @@ def _screw(flat: Mapping[str, Any]) -> Rates:
 
 
 def settling(flat: Mapping[str, Any], within: float) -> float:
-    """Return the longer settling time [s] of a move there and back; infinite if the stage stays out, NaN if failed."""
+    """Return the longer settling time [s] of a move there and back.
+
+    It is infinite if the stage stays out of the band, and NaN if the run failed.
+    """
     ramp, back, duration = (flat[f"motion.{name}"] for name in ("acceleration_time", "return_at", "duration"))
     state, rates, place = by_hand(flat)
     longest = 0.0
@@ -183,7 +190,7 @@ def settling(flat: Mapping[str, Any], within: float) -> float:
 
 
 def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
-    """Tune a machine, try what works on fresh machines, and append a line for each to the file."""
+    """Tune a machine, try working settings on fresh machines, and append a line for each to the file."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     if not any(row["machine"] == name and "told" in row for row in rows):
         begun = process_time()
@@ -229,7 +236,10 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
 
 
 def table(file: Path) -> None:
-    """Print the settings with the share told, and the share by own equations for each class of moves."""
+    """Print the settings with two fractions: the one that friso states, and the one by these equations.
+
+    The latter is printed for each class of moves.
+    """
     rows = [json.loads(line) for line in file.read_text().splitlines()]
     listed = []
     for row in (row for row in rows if row.get("told")):

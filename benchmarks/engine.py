@@ -1,6 +1,7 @@
-"""Benchmarks of the engine (issue 2, section 6), by ``python -m benchmarks.engine``; ``--help`` lists the options.
+"""Benchmark the engine (issue 2, section 6): ``python -m benchmarks.engine``.
 
-Sections: race (friso, prototype and peers on one rig), precision (work against precision), maps, check, memory.
+``--help`` lists the options. Sections: race (friso, prototype and peers on one rig), precision (work against
+precision), maps, check, memory.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from benchmarks.race import Field
     from benchmarks.rigs import Rig
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded; 9 x 9 systems gain nothing
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded; 9 x 9 systems gain nothing from threads
 
 SECTIONS = ("race", "precision", "maps", "check", "memory")
 
@@ -55,7 +56,7 @@ def main() -> None:
 
 
 def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: bool) -> list[Field]:
-    """The two races with their reference traces."""
+    """Return the two races with their reference traces."""
     import numpy as np
 
     from benchmarks.compiled import compile_equations

@@ -1,12 +1,12 @@
-"""Findings on file: `python -m benchmarks.evidence [NAME ...] [--equations]`.
+"""Compute stored findings again: `python -m benchmarks.evidence [NAME ...] [--equations]`.
 
-Without arguments, the entries of friso/evidence.toml are listed with their dates, and those that are older than the
-equations or than the code they rest on are marked. NAME computes an entry again and writes it back with today's date,
-the revision of the equations and the digest of that code; "quick" stands for all that take less than a few minutes
-each. Documents that state a finding are listed where the value has changed: they are edited by hand.
+Without arguments, the entries of friso/evidence.toml are listed with their dates, and those older than the equations or
+than the code behind them are marked. NAME computes an entry again and writes it back with today's date, the revision of
+the equations and the digest of that code; "quick" stands for all entries that take less than a few minutes each.
+Documents that state a finding are listed if the value has changed: they are edited by hand.
 
-`--equations` compares the reference numbers of the equations (`benchmarks.canonical`) with those on file and, if they
-differ, begins a new revision: every entry is then older than the equations.
+`--equations` compares the reference numbers of the equations (`benchmarks.canonical`) with the stored ones. If they
+differ, it begins a new revision: every entry is then older than the equations.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ NAN = float("nan")
 
 
 def friso(*arguments: str) -> dict[str, Any]:
-    """The JSON document of a command, run in the repository's folder."""
+    """Return the JSON document of a command, run in the repository's folder."""
     command = [sys.executable, "-m", "friso", *arguments, "--json"]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
 
 
 def rig(experiment: str) -> dict[str, Any]:
-    """What an experiment of the virtual rig found on the thesis's rig."""
+    """Return what an experiment of the virtual rig finds on the thesis's rig."""
     return friso("rig", experiment, DRIVE)["results"]
 
 
@@ -202,7 +202,7 @@ def hunting_limiter() -> Values:
 
 
 def hunting_supercritical() -> Values:
-    """A test asserts it: an exception if it does not hold."""
+    """Return the finding that a test asserts, or raise an exception if it does not hold."""
     entry = evidence.findings_on_file()["hunting.supercritical"]
     subprocess.run([sys.executable, "-m", *entry.command.split(), "-p", "no:cacheprovider"], cwd=ROOT, check=True)
     return dict(entry.values)
@@ -245,7 +245,10 @@ def hunting_adrc() -> Values:
 
 
 def minutes(*arguments: str) -> float:
-    """CPU time of a command and the processes it starts [min]: other work on the machine hardly changes it."""
+    """Return the CPU time [min] of a command and the processes it starts.
+
+    Other work on the machine hardly changes it.
+    """
     import resource  # Windows has none
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -278,29 +281,29 @@ LONG: Mapping[str, Callable[[], Values]] = {
 }
 
 BY_HAND = ("rig.loop", "identify.known-truth")
-"""Entries whose command, an hour of computation and more, prints a table that is read by eye."""
+"""Entries whose command takes an hour or more, and prints a table that is read by eye."""
 
 
 def renewed(entry: Entry, values: Values) -> Entry:
-    """The entry with values computed now."""
+    """Return the entry with values computed now."""
     revision = evidence.equations().revision
     code = code_digest(entry.rests_on)
     return replace(entry, values=values, computed=date.today(), equations=revision, code=code, note="")
 
 
 def old(entries: Mapping[str, Entry]) -> list[str]:
-    """Names of the entries that were computed with other equations than those on file."""
+    """Return the names of entries that were computed with other equations than the stored ones."""
     revision = evidence.equations().revision
     return [name for name, entry in entries.items() if entry.equations != revision]
 
 
 def older_than_code(entries: Mapping[str, Entry]) -> list[str]:
-    """Names of the entries that were computed with other criteria, methods or experiments than those of today."""
+    """Return the names of entries that were computed with other criteria, methods or experiments."""
     return [name for name, entry in entries.items() if entry.code != code_digest(entry.rests_on)]
 
 
 def written(entries: Mapping[str, Entry], equations: Equations) -> str:
-    """The file."""
+    """Return the content of the evidence file."""
     lines = [HEAD, "[equations]", f"revision = {equations.revision}", f"since = {equations.since}"]
     for stage, outputs in equations.numbers.items():
         lines += ["", f"[equations.numbers.{_quoted(stage)}]"]

@@ -1,7 +1,7 @@
-"""Linear analysis: `python -m benchmarks.frequency`.
+"""Time the linear analysis: `python -m benchmarks.frequency`.
 
-The worst case over a family of 10^4 states at once, against one python-control system after the other; the whole
-analysis of the thesis rig; and its speed with a sampled drive.
+It compares the worst case over a family of 10^4 states at once with one python-control system after the other. It also
+times the whole analysis of the thesis rig, also with a sampled drive.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DRIVES = {"continuous": {}, "sampled": {"drive.sample_time": "50 us", "drive.del
 
 
 def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]:
-    """Poles and least distance from -1 of each member, by python-control."""
+    """Return poles and least distance from -1 of each member, by python-control."""
     margins = []
     for k in range(len(members)):
         loop = friso.linear(stage, members[k], "open")

@@ -1,15 +1,16 @@
-"""Identification against known truth: `python -m benchmarks.identify [--machines 20] [--moves 10] [--kept FILE]`.
+"""Test identification against known truth.
 
-Machines drawn at random (tests/machines.py) are simulated in closed loop, their logs get noise of force, position and
-time, and digits, and are identified again; moves with the machine's own controller known and not known. Per method and
-quantity: of the machines whose motion shows it how many report it, how many of the 95 % intervals reported hold the
-truth, how wide they are, and of how many that are not shown the range that is left holds the truth.
+`python -m benchmarks.identify [--machines 20] [--moves 10] [--kept FILE]` simulates machines drawn at random
+(tests/machines.py) in closed loop. Their logs get noise of force, position and time, and finite digits, and are
+identified. Moves are identified with the machine's own controller known, and not known. For each method and quantity it
+prints, among machines whose motion shows the quantity, how many report it, how many of the 95 % intervals hold the
+truth, and how wide they are; and for how many other machines the remaining range holds the truth.
 
-A motion shows a quantity if the best unbiased estimate of its noise, in closed loop, would be better than 30 %
+A motion shows a quantity if the best unbiased estimate from its noise, in closed loop, would be better than 30 %
 (Cramer-Rao bound). `--moves` is the number of machines whose moves are fitted (two fits each, about half a minute); the
 other experiments take a second (`--machines 0` leaves them out). With `--kept`, the answers on each machine are
-appended to that file as they come, and those it holds are not computed again: a long study runs in pieces, and
-`--first 100 --moves 100 --kept FILE` then prints the table of them all.
+appended to that file as they come, and are not computed again: a long study runs in pieces, and `--first 100 --moves
+100 --kept FILE` then prints the table of all.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from machines import Machine, break_aways, creeping, drawn, moves, shaken, speeds, steps
 
 WANTED, REPORTED = 0.9, 0.5
-"""Share of the shown quantities whose intervals have to hold the truth, and of the machines whose motion shows a
-quantity that have to report it."""
+"""Fraction of the shown quantities whose intervals must hold the truth, and fraction of the machines whose motion shows
+a quantity that must report it."""
 
 GOALS = ("masses.cart", "friction.coulomb", "friction.viscous", "friction.static", "joint.stiffness")
 SLOW = (
@@ -53,19 +54,22 @@ SLOW = (
     "friction.bristle_stiffness",
     "friction.bristle_damping",
 )
-"""Quantities that the goal of intervals is about, and that of reporting."""
+"""Quantities in the goal for intervals, and quantities in the goal for reporting."""
 
 VISIBLE = 0.3
-"""Half of the best 95 % interval over the value, below which a motion shows a quantity."""
+"""Half of the best 95 % interval over the value, below which a motion counts as showing a quantity."""
 
 TIMING = 1e-6
-"""Standard deviation [s] of the instants at which a log is sampled."""
+"""Standard deviation [s] of the sampling instants of a log."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a method says of a quantity of a machine: the 95 % interval or, where it is not `reported`, the range left
-    possible; the truth, and whether the motion shows it (`visible`)."""
+    """Answer of a method on a quantity of a machine.
+
+    It has the 95 % interval or, if not `reported`, the remaining range; the truth; and whether the motion shows the
+    quantity (`visible`).
+    """
 
     method: str
     name: str
@@ -87,15 +91,18 @@ class Answer:
 
     @property
     def miss(self) -> str:
-        """The interval and the truth that it does not hold."""
+        """Return the interval and the truth that it misses, as text."""
         span = f"{self.low:.4g} to {self.high:.4g}{'' if self.reported else ' (not shown)'}"
         return f"{self.method}: {self.name} {span}, true {self.truth:.4g}"
 
 
 @dataclass
 class Count:
-    """How often a quantity was held or missed, its half-widths over the truth, how often it was not reported and its
-    range was right, and how often the motion shows it, and it was then reported."""
+    """Counts for a quantity: how often it was held or missed, with its half-widths over the truth.
+
+    Further, how often it was not reported and its range was right, how often the motion shows it, and how often it was
+    then reported.
+    """
 
     held: int = 0
     missed: int = 0
@@ -126,7 +133,7 @@ def mass_of(flat: dict) -> float:
 
 
 def of_rigid(machine: Machine) -> Iterator[Answer]:
-    """Break-away, constant speeds, and the frequency response of a machine without joint."""
+    """Yield answers on a machine without joint: break-away, constant speeds, and frequency response."""
     flat = machine.flat
     mass = mass_of(flat)
     yield Answer.of("break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"])
@@ -141,7 +148,11 @@ def of_rigid(machine: Machine) -> Iterator[Answer]:
 
 
 def of_jointed(machine: Machine) -> Iterator[Answer]:
-    """Steps with the cart held, and slow motion that sticks and slips, with the stiffness that these gave."""
+    """Yield answers on a machine with a joint.
+
+    They come from steps with the cart held, and from slow motion that sticks and slips, with the stiffness of the
+    steps.
+    """
     flat = machine.flat
     stiffness = stiffness_from_steps(steps(machine)).stiffness
     yield Answer.of("steps", stiffness, flat["joint.stiffness"])
@@ -151,7 +162,10 @@ def of_jointed(machine: Machine) -> Iterator[Answer]:
 
 
 def of_moves(machine: Machine) -> Iterator[Answer]:
-    """Moves, with and without the machine's own controller; of a log that is refused nothing is reported."""
+    """Yield answers from moves, with and without the machine's own controller.
+
+    A refused log reports nothing.
+    """
     log = sampled_in_time(moves(machine), machine)
     flat, visible = machine.flat, shown_by(log, machine)
     for controller_known, method in ((True, "moves, controller known"), (False, "moves, controller unknown")):
@@ -165,14 +179,17 @@ def of_moves(machine: Machine) -> Iterator[Answer]:
 
 
 def sampled_in_time(log: Log, machine: Machine) -> Log:
-    """The log sampled at instants that are a little off."""
+    """Return the log sampled at instants that are slightly off."""
     late = TIMING * machine.rng.standard_normal(len(log.time))
     speed = np.gradient(log["reference"], log.sample_time)
     return replace(log, signals={**log.signals, "position": log["position"] + late * speed})
 
 
 def shown_by(log: Log, machine: Machine) -> set[str]:
-    """The keys that the motion of a log shows: by the Cramer-Rao bound of its force's noise, in closed loop."""
+    """Return the keys that the motion of a log shows.
+
+    The Cramer-Rao bound for the noise of its force, in closed loop, decides.
+    """
     flat = {**machine.flat, "friction.viscous_asymmetry": 1e-6}  # not 0: it is one of the equations
     levels = {name: flat[f"friction.{name}"] for name in ("coulomb", "viscous")}
     levels |= {"mass": mass_of(flat), "offset": -flat["bias.cart"]}
@@ -204,7 +221,7 @@ TASKS: Mapping[str, Callable[[int], Iterable[Answer]]] = {
 
 
 def run(tasks: Iterable[Task], kept: Path | None = None) -> list[Answer]:
-    """The answers on machines by task, computed unless the file `kept` holds them, and kept there."""
+    """Return the answers on machines by task; the file `kept` stores them, and answers in it are reused."""
     before = _read(kept) if kept else {}
     every: list[Answer] = []
     for task in tasks:
@@ -236,7 +253,7 @@ def _read(kept: Path) -> dict[Task, list[Answer]]:
 
 
 def counted(answers: Iterable[Answer]) -> dict[tuple[str, str], Count]:
-    """By method and quantity."""
+    """Return the counts by method and quantity."""
     counts: dict[tuple[str, str], Count] = defaultdict(Count)
     for answer in answers:
         counts[answer.method, answer.name].add(answer)
@@ -262,7 +279,7 @@ def rows(counts: dict[tuple[str, str], Count]) -> list[list[str]]:
 
 
 def goals(counts: dict[tuple[str, str], Count]) -> list[Goal]:
-    """Of each quantity that the goals are about, by each method that shows it."""
+    """Return the goals on each of their quantities, for each method that shows it."""
     reached = []
     for (method, name), count in sorted(counts.items(), key=lambda item: item[0][::-1]):
         if name in GOALS and count.reported:

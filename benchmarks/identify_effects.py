@@ -1,9 +1,10 @@
-"""Effects outside the model of moves: `python -m benchmarks.identify_effects [FAMILY ...] [--machines 5]`.
+"""Test moves with effects outside the model: `python -m benchmarks.identify_effects [FAMILY ...]`.
 
-Machines drawn at random are simulated by a program of its own (LuGre friction by an implicit step, a sampled servo that
-nobody tells friso of), each with one effect that is in no stage file, of 10 % of the friction or more, and sound ones.
-Of each family: how many logs were noticed (a doubt was raised, or the log refused), how many named the right cause
-first, how many of the values reported hold the truth, and how many were still reported. Sound logs show false alarms.
+Machines drawn at random are simulated by a separate program (LuGre friction by an implicit step, and a sampled servo
+unknown to friso). Each has one effect that is in no stage file, of 10 % of the friction or more; some are sound.
+`--machines 5` sets their number in a family. For each family it prints how many logs were noticed (a doubt was raised,
+or the log refused), how many named the right cause first, how many reported values hold the truth, and how many were
+still reported. Sound logs show false alarms.
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ from friso.identification.kind import NOTHING_CHOSEN, Prior
 from friso.identification.logs.log import Log
 
 STEP, TIME, PARTS = 1e-3, 6.0, 50
-"""Sample time and length of a log [s], and steps of the simulation for each sample."""
+"""Sample time and length of a log [s], and simulation steps per sample."""
 
 MOVES = ((0.3, 1.0), (1.1, -1.0), (1.9, 0.4), (2.7, -0.4), (3.5, 0.7), (4.3, -0.7), (5.1, 0.15))
-"""Instants [s] at which moves begin, and their speeds over the highest."""
+"""Instants [s] at which moves begin, and their speeds relative to the highest."""
 
 
 @dataclass(frozen=True)
 class Effects:
-    """A machine and what acts on it; every effect is off by default.
+    """A machine and the effects on it; each effect is off by default.
 
-    Lengths in m, forces in N, times in s. `load` is the share of the mass behind the measured position, on a spring of
-    `stiffness` with `play`; friction acts on the motor's side, or `on_load`.
+    Lengths are in m, forces in N, times in s. `load` is the fraction of the mass behind the measured position, on a
+    spring of `stiffness` with `play`; friction acts on the motor's side, or `on_load`.
     """
 
     mass: float
@@ -72,7 +73,7 @@ class Effects:
 
 @njit(cache=True)
 def _run(reference, speed, p, step, parts):
-    """Position [m] and force [N] at the samples, shape (n,), for the numbers `p` of a machine."""
+    """Return position [m] and force [N] at the samples, shape (n,), for the numbers `p` of a machine."""
     mass, coulomb, static, stribeck, viscous, bristle, kp, kd, ki = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8]
     grows, place, cogging, pitch = p[9], p[10], p[11], p[12]
     load, stiffness, damping, play = p[13], p[14], p[15], p[16]
@@ -121,7 +122,7 @@ def _run(reference, speed, p, step, parts):
 
 
 def simulated(machine: Effects, rng: np.random.Generator) -> Log:
-    """A log of moves of a machine, with noise, under time, position and force."""
+    """Return a log of a machine's moves, with noise, with columns for time, position and force."""
     clock = np.arange(round(TIME / STEP)) * STEP
     ramp, cruise, wanted = 0.12, 0.35, np.zeros(len(clock))
     for start, share in MOVES:
@@ -150,15 +151,15 @@ def simulated(machine: Effects, rng: np.random.Generator) -> Log:
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number whose logarithm is drawn evenly."""
+    """Draw a number evenly in its logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def plain(rng: np.random.Generator) -> dict[str, float]:
-    """The numbers of a sound machine."""
+    """Draw the numbers of a sound machine."""
     mass = _between(rng, 1.0, 6.0)
     top = _between(rng, 0.15, 0.6)
-    coulomb = mass * top / 0.12 * _between(rng, 0.1, 0.6)  # a motor that never brakes shows no friction that grows
+    coulomb = mass * top / 0.12 * _between(rng, 0.1, 0.6)  # a motor that never brakes hides friction that grows
     return {
         "mass": mass,
         "coulomb": coulomb,
@@ -251,8 +252,8 @@ FAMILIES: Mapping[str, tuple[Callable[[dict[str, float], np.random.Generator], d
     "gain switch": (_gain_switch, ("changing-gains",)),
     "wrong sign": (_wrong_sign, ("the other sign",)),
 }
-"""Each family by name: what it adds to a sound machine, and the doubts that are right about it, or words of theirs. A
-saturated force that is logged as it acts is in the model."""
+"""Families by name: the effect that each adds to a sound machine, and the doubts that are right about it, or words in
+them. A saturated force that is logged as it acts belongs to the model."""
 
 KEYS = {
     "masses.cart": "mass",
@@ -260,12 +261,12 @@ KEYS = {
     "friction.viscous": "viscous",
     "friction.static": "static",
 }
-"""Keys of the stage file, and the numbers of a machine that they should hold."""
+"""Keys of the stage file, and the numbers of a machine that their intervals should hold."""
 
 
 @dataclass
 class Outcome:
-    """What was said of one log: doubts in words with their names, the first cause, values held and reported."""
+    """Result for one log: doubts in words with their names, the first cause, values held and reported."""
 
     family: str
     seed: int
@@ -278,13 +279,14 @@ class Outcome:
 
     @property
     def noticed(self) -> bool:
-        """Whether anything was said against the log."""
+        """Tell whether any doubt or refusal was stated."""
         return bool(self.refused or self.doubts)
 
     def right(self, names: Iterable[str]) -> bool:
-        """Whether the first cause that was named is one of these."""
+        """Tell whether the first cause named is one of these."""
         causes = [name for name, _ in self.doubts if name not in ("model", "little-friction")]
-        said = self.doubts[0][1] if self.doubts else self.refused  # what explains the inverse model stands in its words
+        # the cause that explains the inverse model is in its words
+        said = self.doubts[0][1] if self.doubts else self.refused
         return (bool(causes) and causes[0] in names) or any(name in said for name in names)
 
 

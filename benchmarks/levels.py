@@ -1,9 +1,9 @@
-"""Answers by the level of the processor: `python -m benchmarks.levels [--stages 40] [--kept FOLDER]`.
+"""Compare answers by the level of the processor: `python -m benchmarks.levels`.
 
-Stages drawn from the series of `benchmarks.truth` are checked, followed (`boundary`), mapped, tuned and
-identified from logs of their own, with code for AVX-512 (or what this machine has), AVX2 and SSE2. What is said is
-compared, its words and the numbers in it. Fewer stages are asked what takes long. `--kept` keeps the answers of each
-level in a folder, one file a question and stage, so that a run goes on where one was stopped.
+Stages drawn from the series of `benchmarks.truth` are checked, followed (`boundary`), mapped, tuned, and identified
+from logs of their own, with code for AVX-512 (or this machine's best), AVX2 and SSE2. Words and numbers of the answers
+are compared. `--stages 40` sets the number; slow questions get fewer stages. `--kept FOLDER` keeps the answers of each
+level, one file for a question and stage, so that a run continues where one was stopped.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from snapshots import NUMBER, words
 
 LEVELS = {"": "own", "x86-64-v3": "AVX2", "x86-64": "SSE2"}
-"""Levels by LLVM's name ("": this machine's own), and what they are known for."""
+"""Levels by LLVM's name ("": this machine's own), and their usual names."""
 
 SEED = 9101
 NEAR = 1e-3
-"""Relative difference of numbers up to which they are told as the same."""
+"""Relative difference up to which numbers count as equal."""
 
 
 def _check(stage: friso.Stage, folder: Path) -> Any:
@@ -74,17 +74,20 @@ QUESTIONS: dict[str, tuple[int, Callable[[friso.Stage, Path], Any]]] = {
     "tune": (21, _tune),
     "identify": (11, _identify),
 }
-"""Questions: of how many stages one is asked it, and how."""
+"""Questions: each has the number of stages per question, and the function that asks."""
 
 
 def drawn(number: int) -> friso.Stage:
-    """A stage of the series in turns."""
+    """Return a drawn stage; series take turns."""
     series = [*SERIES]
     return draw(SEED, number // len(series), series[number % len(series)])
 
 
 def answer(folder: Path, count: int) -> None:
-    """Keep what is said of so many stages in a folder, in this process, but for what is kept there already."""
+    """Compute the answers on `count` stages in this process, and keep them in a folder.
+
+    Answers that are there already are not computed again.
+    """
     for question, (every, ask) in QUESTIONS.items():
         for number in range(0, count, every):
             if not (place := folder / f"{question}-{number}.txt").exists():
@@ -97,8 +100,10 @@ def answer(folder: Path, count: int) -> None:
 
 
 def compared(own: str, other: str) -> tuple[bool, float]:
-    """Whether two texts have the same words, and the largest relative difference of their numbers (infinite where they
-    have not)."""
+    """Tell whether two texts have the same words, and the largest relative difference of their numbers.
+
+    It is infinite if the words differ.
+    """
     first, second = words(own), words(other)
     numbers = [(a, b) for a, b in zip(first, second, strict=False) if NUMBER.fullmatch(a) and NUMBER.fullmatch(b)]
     same = len(first) == len(second) and all(a == b or (a, b) in numbers for a, b in zip(first, second, strict=True))
@@ -107,7 +112,7 @@ def compared(own: str, other: str) -> tuple[bool, float]:
 
 
 def main() -> None:
-    """Have the answers of each level computed, and print what differs."""
+    """Compute the answers of each level, and print what differs."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--stages", type=int, default=40)
     parser.add_argument("--kept", type=Path)
@@ -126,7 +131,7 @@ def main() -> None:
 
 
 def _rows(kept: Path) -> list[list[str]]:
-    """A row for each question and level; answers that differ are printed on the way."""
+    """Return a row for each question and level; print answers that differ on the way."""
     rows = []
     for question in QUESTIONS:
         own = {file.name: file.read_text("utf-8") for file in sorted((kept / "own").glob(f"{question}-*.txt"))}

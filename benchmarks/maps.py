@@ -1,7 +1,7 @@
-"""Parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`.
+"""Time parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`.
 
-All of the thesis's maps, a study of 10^6 runs, the cost per run from 10^3 to 10^6 runs, and the same cells by SciPy's
-Radau with compiled functions on a process pool, extrapolated from a sample.
+Parts are all of the thesis's maps; a study of 10^6 runs; the cost per run from 10^3 to 10^6 runs; and the cells of the
+maps by SciPy's Radau with compiled functions on a process pool, extrapolated from a sample.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from friso_thesis.studies.thesis.studies import STUDIES, thesis_rig
 
 RTOLS = (1e-4, 1e-6)
 WANTED = {1e-4: 1.5, 1e-6: 5.0}
-"""Wall time of all maps [s], by tolerance."""
+"""Wanted wall time of all maps [s], by tolerance."""
 
 EIGHT = {
     "controller.crossover": "1 Hz..16 Hz",
@@ -45,26 +45,26 @@ EIGHT = {
     "friction.coulomb": "0.1 N..1.5 N",
     "masses.cart": "0.5 kg..3 kg",
 }
-"""Ranges of the eight parameters of the large study, after the thesis's Table 3."""
+"""Ranges of the eight parameters of the large study, from the thesis's Table 3."""
 
 
 def thesis_studies(rtol: float, points: int = 41) -> list[Study]:
-    """All maps of the thesis."""
+    """Return all maps of the thesis."""
     return [Request(s.stage(), s.axes(points), links=s.links).study(rtol=rtol) for s in STUDIES.values()]
 
 
 def large_study(count: int, rtol: float) -> Study:
-    """The free rig over a Sobol sample of eight parameters."""
+    """Return a study of the free rig over a Sobol sample of eight parameters."""
     return Request(_untuned(thesis_rig()), {}, Samples(EIGHT, count)).study(rtol=rtol)
 
 
 def _untuned(stage: Stage) -> Stage:
-    """The stage with its controller tuned for cart and stage, whatever they weigh."""
+    """Return the stage with its controller tuned for cart and stage together, whatever they weigh."""
     return stage.replace({"controller.tuned_mass": None})
 
 
 def run_maps(repetitions: int) -> list[Goal]:
-    """Wall time of all maps at once, kernels warm."""
+    """Measure the wall time of all maps at once, with warm kernels."""
     rows, goals = [], []
     with local_crew() as crew:
         for rtol in RTOLS:
@@ -81,7 +81,7 @@ def run_maps(repetitions: int) -> list[Goal]:
 
 
 def run_large(count: int, rtol: float) -> list[Goal]:
-    """A large Sobol study into a store: time, rate and peak memory."""
+    """Run a large Sobol study into a store; measure time, rate and peak memory."""
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder, local_crew() as crew:
         run_in_memory([large_study(64, rtol)], crew)
         store = Path(folder) / "large.zarr"
@@ -99,7 +99,7 @@ def run_large(count: int, rtol: float) -> list[Goal]:
 
 
 def run_growth(largest: int, rtol: float, repetitions: int) -> list[Goal]:
-    """Cost per run of ever larger studies, in memory; the small ones repeated."""
+    """Measure the cost per run of ever larger studies in memory; small ones are repeated."""
     rows, costs = [], []
     with local_crew() as crew:
         run_in_memory([large_study(64, rtol)], crew)
@@ -125,7 +125,7 @@ def _often(count: int, repetitions: int) -> int:
 
 
 def run_overhead(blocks: int) -> list[Goal]:
-    """What a block costs besides its runs: blocks of cells that no stage may have, which need none."""
+    """Measure the cost of a block besides its runs, with blocks of invalid cells, which need no run."""
     rows = []
     axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
     study = Request(thesis_rig(), axes).study()
@@ -143,7 +143,7 @@ def run_overhead(blocks: int) -> list[Goal]:
 
 
 def run_peer(cells_per_map: int) -> list[Goal]:
-    """A sample of the cells of all maps by SciPy's Radau on a process pool, extrapolated to all of them."""
+    """Run a sample of the cells of all maps by SciPy's Radau on a process pool, and extrapolate to all."""
     rtol = RTOLS[0]
     jobs = [job for study in thesis_studies(rtol) for job in _sampled(study, cells_per_map)]
     with ProcessPoolExecutor() as pool:
@@ -181,7 +181,7 @@ def _by_friso(crew: Crew, rtol: float) -> float:
 
 
 def _sampled(study: Study, count: int) -> list[tuple[Stage, float]]:
-    """Stages of some cells that a stage may have."""
+    """Return stages of some valid cells."""
     cells: list[tuple[Stage, float]] = []
     for number in np.random.default_rng(0).permutation(study.cells):
         try:
@@ -194,7 +194,10 @@ def _sampled(study: Study, count: int) -> list[tuple[Stage, float]]:
 
 
 def _by_radau(job: tuple[Stage, float]) -> float:
-    """Run one cell by Radau; the time its compilation took [s], which a real study would share among its cells."""
+    """Run one cell by Radau.
+
+    Returns the compilation time [s] too, which a real study would share among its cells.
+    """
     stage, rtol = job
     rig = rig_of(stage)
     start = time.perf_counter()

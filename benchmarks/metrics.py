@@ -1,4 +1,4 @@
-"""What is compared: hunting peaks, the settled cycle, and distance from a reference trace."""
+"""Define what is compared: hunting peaks, the settled cycle, and distance from a reference trace."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ COUNTED_AFTER, COUNTED_ABOVE, APART = 10.0, 1e-4, 0.5
 
 
 def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and heights [m] of the counted maxima among turning points, in order of time.
+    """Return times [s] and heights [m] of the counted maxima among turning points, in order of time.
 
-    `beyond` stands before the first and after the last value: -inf lets the ends count, inf does not.
+    `beyond` stands before the first and after the last value: with -inf the ends count, with inf they do not.
     """
     inner = np.pad(values, 1, constant_values=beyond)
     top = (inner[1:-1] > inner[:-2]) & (inner[1:-1] >= inner[2:])
@@ -27,7 +27,7 @@ def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tu
 
 
 def sampled_maxima(times: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The counted maxima of a sampled trace, each refined by the parabola through three samples."""
+    """Return the counted maxima of a sampled trace, each refined by a parabola through three samples."""
     at_maxima, _ = maxima(times, position, np.inf)
     at = np.clip(np.searchsorted(times, at_maxima), 1, len(times) - 2)
     y0, y1, y2 = position[at - 1], position[at], position[at + 1]
@@ -39,7 +39,7 @@ def sampled_maxima(times: np.ndarray, position: np.ndarray) -> tuple[np.ndarray,
 
 @dataclass(frozen=True)
 class Cycle:
-    """Peak count, mean height of the counted maxima [m] and their mean spacing [s]; NaN without any."""
+    """Peak count, mean height [m] and mean spacing [s] of the counted maxima; NaN without any."""
 
     peaks: int
     amplitude: float
@@ -47,7 +47,7 @@ class Cycle:
 
 
 def cycle(turns: tuple[np.ndarray, np.ndarray]) -> Cycle:
-    """The cycle that the counted maxima belong to."""
+    """Return the cycle to which the counted maxima belong."""
     times, heights = turns
     amplitude = float(heights.mean()) if len(heights) else np.nan
     return Cycle(len(times), amplitude, float(np.diff(times).mean()) if len(times) > 1 else np.nan)
@@ -64,7 +64,7 @@ class Distance:
 
 
 def distance(times: np.ndarray, trace: np.ndarray, reference: np.ndarray) -> Distance:
-    """How far a trace is from the reference on the same times."""
+    """Return how far a trace is from the reference at the same times."""
     off = np.abs(trace - reference)
 
     def rms(part: np.ndarray) -> float:

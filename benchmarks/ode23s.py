@@ -1,7 +1,7 @@
-"""The thesis's solver (Sec. 3.2.3) on its rig: MATLAB's ode23s at a relative tolerance of 1e-4, steps up to 1e-4 s.
+"""Run the thesis's solver (Sec. 3.2.3) on its rig: MATLAB's ode23s at 1e-4, with steps up to 1e-4 s.
 
 The method is that of Shampine and Reichelt (1997), The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, Sec. 3, with their
-control of the step; the absolute tolerance, which the thesis does not state, is Simulink's 1e-6 in every state. The
+control of the step. The absolute tolerance, which the thesis does not state, is Simulink's 1e-6 in every state. The
 equations of the rig are written here by hand, from Sec. 3.1 and 3.2 and Table 1 and 2: nothing of friso's equations or
 engine is used.
 """
@@ -27,7 +27,7 @@ SAMPLE = 1e-3
 
 @njit
 def reference(t: float, acceleration: float, time: float, back: float) -> float:
-    """There and back, each move accelerating for a time and braking for as long."""
+    """Return the reference of a move there and back; each half accelerates, then brakes for as long."""
     if t >= back:
         return acceleration * time**2 - _moved(t - back, acceleration, time)
     return _moved(t, acceleration, time)
@@ -43,7 +43,7 @@ def _moved(t: float, acceleration: float, time: float) -> float:
 
 @njit
 def rates(t: float, x: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
-    """dx/dt into `out`; `p` as `parameters` lists them."""
+    """Write dx/dt into `out`; `p` are the numbers listed by `parameters`."""
     (cart, stage, part, inner_k, inner_d, static, coulomb, stribeck, s0, s1, s2, locked, k_j, d_j, stroke, k_l, d_l,
      k_p, tau_z, tau_i, tau_p, acceleration, time, back) = p  # fmt: skip
     x_c, v_c, x_s, v_s, x_i, v_i, z, low, integral = x
@@ -68,7 +68,7 @@ def rates(t: float, x: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
 
 @njit
 def ode23s(p: np.ndarray, end: float, rtol: float, atol: float, largest: float, sample: float) -> tuple:
-    """Samples of the stage's position from rest, shape (n,), the number of steps and of those rejected."""
+    """Solve from rest; return samples of the stage's position, (n,), and numbers of steps and rejected steps."""
     n, t, h = STATES, 0.0, 1e-6
     x, new, moved = np.zeros(n), np.zeros(n), np.zeros(n)
     f0, f1, f2, ft = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -118,7 +118,7 @@ def ode23s(p: np.ndarray, end: float, rtol: float, atol: float, largest: float, 
 
 
 def parameters(flat: Mapping[str, float]) -> np.ndarray:
-    """The numbers of `rates`, from the SI values of a stage file of the rig, and Eq. 8."""
+    """Return the numbers of `rates`, from the SI values of a stage file of the rig, and Eq. 8."""
     omega = 2 * np.pi * flat["controller.crossover"]
     part = flat["parasitic.mass"]
     stage = flat["masses.stage"]
@@ -141,7 +141,10 @@ def parameters(flat: Mapping[str, float]) -> np.ndarray:
 
 
 def counted_peaks(deviation: np.ndarray) -> int:
-    """MATLAB's findpeaks as in Sec. 3.2.2: maxima after 10 s above 0.1 mm, the tallest first, 0.5 s apart."""
+    """Count peaks by MATLAB's findpeaks as in Sec. 3.2.2.
+
+    They are maxima after 10 s above 0.1 mm, the tallest first, 0.5 s apart.
+    """
     from scipy.signal import find_peaks
 
     late = deviation[round(10 / SAMPLE) :]
@@ -149,7 +152,10 @@ def counted_peaks(deviation: np.ndarray) -> int:
 
 
 def thesis_solver() -> dict[str, float]:
-    """Peaks, swing over the last quarter [m] and steps of every run that is judged: `locked_8_hz_peaks`, for one."""
+    """Return peaks, swing over the last quarter [m] and steps of every judged run.
+
+    An example of a name is `locked_8_hz_peaks`.
+    """
     from friso_thesis.studies.thesis import thesis_rig
     from friso_thesis.studies.thesis.judges.solver import CASES
 
@@ -163,9 +169,12 @@ def thesis_solver() -> dict[str, float]:
 
 
 def other_solvers() -> dict[str, float]:
-    """Peaks, swing over the last quarter [m], steps and evaluations of the equations of ode23s, of backward
-    differentiation of variable order (the method of ode15s) and of Dormand and Prince's (ode45), the joint locked and
-    free, at the thesis's tolerance, with no largest step: `locked_ode45_evaluations`, for one."""
+    """Return the results of three solvers at the thesis's tolerance, with no largest step.
+
+    They are peaks, swing over the last quarter [m], steps and evaluations of the equations of ode23s, of backward
+    differentiation of variable order (the method of ode15s) and of Dormand and Prince's (ode45), with the joint locked
+    and free. An example of a name is `locked_ode45_evaluations`.
+    """
     from friso_thesis.studies.thesis import thesis_rig
 
     values: dict[str, float] = {}
@@ -183,7 +192,7 @@ def other_solvers() -> dict[str, float]:
 
 
 def _of_scipy(name: str, numbers: np.ndarray, end: float) -> tuple[np.ndarray, int, int]:
-    """Samples of the stage's position, steps and evaluations, those of numerical Jacobians included."""
+    """Return samples of the stage's position, steps, and evaluations including those of Jacobians."""
     from scipy.integrate import BDF, RK45
 
     def derivative(t: float, x: np.ndarray) -> np.ndarray:

@@ -1,9 +1,9 @@
-"""friso on an arm64 machine, emulated: `python -m benchmarks.other_machines STAGE.toml`.
+"""Compare friso on an emulated arm64 machine: `python -m benchmarks.other_machines STAGE.toml`.
 
-Makes a Debian arm64 root (mmdebstrap), installs this checkout into it as a wheel, has a check and a map of 9 x 9 run
-there and here, and compares: all verdicts equal, all numbers within `AGREEMENT`; status 1 where they are not. It is run
-as root, on Debian with mmdebstrap, arch-test and qemu-user-static, with binfmt_misc mounted. An emulated processor
-is slow: the check of a rigid stage took 162 s there and 6 s here.
+It makes a Debian arm64 root (mmdebstrap), installs this checkout there as a wheel, runs a check and a map of 9 x 9 on
+both machines, and compares. All verdicts must be equal, and all numbers within `AGREEMENT`; otherwise the status is 1.
+It runs as root, on Debian with mmdebstrap, arch-test and qemu-user-static, with binfmt_misc mounted. An emulated
+processor is slow: the check of a rigid stage took 162 s there and 6 s here.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from benchmarks.report import print_table
 CHECKOUT = Path(__file__).parent.parent
 
 AGREEMENT = 1e-3
-"""Relative difference that numbers of different processors may have: fused products round differently, and a run over
-20 s carries that on."""
+"""Largest relative difference of numbers between processors: fused products round differently, and a run over 20 s
+amplifies that."""
 
 OF_SWINGS = {"peak_to_peak", "period"}
-"""What is compared where the stage swings: of what comes to rest, they are those of the solver's errors."""
+"""Numbers that are compared only if the stage swings. For a stage at rest they show errors of the solver."""
 
 OF_SOLVER = {"steps", "rejected"}
-"""What may differ: steps of the solver, which are another number where rounding decides on one."""
+"""Numbers that may differ: steps of the solver, where rounding decides on one."""
 
 DEBIAN, PYTHON, GLIBC = "bookworm", "3.11", 36
-"""The release, its Python, and its C library (2.36), which says what wheels run there."""
+"""Debian's release, its Python, and its C library (2.36), which decides on the wheels that run there."""
 
 FOLDER = "opt/friso"
-"""Where friso and its packages are in the root."""
+"""Folder of friso and its packages in the root."""
 
 MAP = ("--x", "controller.crossover=2 Hz..16 Hz:9", "--y", "friction.viscous=5 N*s/m..40 N*s/m:9", "--verify", "0")
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What a machine says, and how long [s] it took."""
+    """Answers of a machine, and the time [s] they took."""
 
     check: dict[str, Any]
     runs: xr.Dataset
@@ -63,7 +63,7 @@ def make_root(root: Path) -> None:
 
 
 def install(root: Path) -> None:
-    """Install this checkout with its dependencies as wheels for that machine."""
+    """Install this checkout and its dependencies as wheels for the emulated machine."""
     shutil.rmtree(root / FOLDER, ignore_errors=True)
     platforms = ["manylinux2014_aarch64", *(f"manylinux_2_{minor}_aarch64" for minor in range(17, GLIBC + 1))]
     pip = [sys.executable, "-m", "pip"]
@@ -76,7 +76,7 @@ def install(root: Path) -> None:
 
 
 def answers(command: list[str], folder: Path) -> Answers:
-    """What `command` (friso) says in a folder in which there is stage.toml."""
+    """Return the answers of `command` (friso) in a folder with stage.toml."""
     begin = time.perf_counter()
     checked = subprocess.run(
         [*command, "check", "stage.toml", "--json"], cwd=folder, stdout=subprocess.PIPE, check=True
@@ -88,7 +88,7 @@ def answers(command: list[str], folder: Path) -> Answers:
 
 
 def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:
-    """What is compared, and by how much it differs: verdicts by their count, numbers relatively."""
+    """Return what is compared, with its difference: counts for verdicts, relative differences for numbers."""
     verdicts = [[case["verdict"] for case in machine.check["cases"].values()] for machine in (here, there)]
     rows = [("verdicts of the check", str(sum(a != b for a, b in zip(*verdicts, strict=True))))]
     swings = here.runs["outcome"].values == "swings"
@@ -104,7 +104,7 @@ def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:
 
 
 def _relative(one: np.ndarray, other: np.ndarray) -> float:
-    """The largest relative difference; infinite where only one of them is a number."""
+    """Return the largest relative difference; infinite if only one of them is a number."""
     if (np.isnan(one) != np.isnan(other)).any():
         return np.inf
     scale = np.maximum(np.abs(one), np.abs(other))
@@ -112,7 +112,7 @@ def _relative(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def main() -> int:
-    """Compare both machines; 1 where they differ."""
+    """Compare both machines; return 1 if they differ."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.other_machines", description=__doc__)
     parser.add_argument("stage", type=Path, metavar="STAGE.toml")
     parser.add_argument("--root", type=Path, help="folder of the root, kept and used again")
@@ -127,7 +127,7 @@ def main() -> int:
             folder.mkdir()
             shutil.copyfile(options.stage, folder / "stage.toml")
         friso = ["python3", "-m", "friso"]
-        # with processes and a /proc of its own, whose mount ends with it
+        # in a process and mount namespace of its own, whose /proc ends with it
         there = ["unshare", "--fork", "--pid", f"--root={root}", "--mount-proc", "--wd=/work", "env", "-i"]
         there += ["PATH=/usr/bin:/bin", "HOME=/work", f"PYTHONPATH=/{FOLDER}", *friso]
         os.environ["PYTHONPATH"] = str(CHECKOUT)

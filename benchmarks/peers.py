@@ -1,9 +1,10 @@
-"""The peers: SciPy's stiff solvers and SUNDIALS CVODE, with compiled right-hand side and Jacobian.
+"""Run the peers: SciPy's stiff solvers and SUNDIALS CVODE, with compiled functions.
 
-Each is tried in two ways, over the whole run at once and piece by piece between the corners of the reference, and the
-faster one counts. Each is also run without sampling, which shows its own steps. Besides the peers that issue 2 names,
-as they come (`NAMED`), there are those that someone who knows the solvers would try: ODEPACK's LSODA with its loop in
-compiled code (`odeint`), and BDF of order 2 at most, since higher orders crawl on lightly damped contact modes.
+Right-hand side and Jacobian are compiled. Each peer is tried in two ways, over the whole run at once and piece by piece
+between the corners of the reference; the faster one counts. Each is also run without sampling, which shows its own
+steps. Issue 2 names some peers, with their default options (`NAMED`). Further peers are what an expert would try:
+ODEPACK's LSODA with its loop in compiled code (`odeint`), and BDF of order 2 at most, since higher orders crawl on
+lightly damped contact modes.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from benchmarks.compiled import Compiled
 from benchmarks.rigs import Rig
 
 TIME_OUT = 120.0
-"""Wall time after which a peer's run is given up [s]."""
+"""Wall time [s] after which a peer's run is abandoned."""
 
 LONG = 5.0
-"""A run that takes longer is neither repeated nor run unsampled [s]."""
+"""Duration [s] beyond which a run is neither repeated nor run unsampled."""
 
 MANY = 10_000_000
 
@@ -43,8 +44,8 @@ class Task:
 
 
 Solve = Callable[[Task], tuple[np.ndarray, int]]
-"""States (times, states) at the times of the task, the first included, and steps (-1: unknown).
-With two times, the states at the solver's own steps where it can give them."""
+"""Function that returns states (times, states) at the times of the task, the first included, and steps (-1: unknown).
+With two times, it returns the states at the solver's own steps if it can."""
 
 
 def _solve_ivp(method: str) -> Solve:
@@ -68,7 +69,7 @@ def _solve_ivp(method: str) -> Solve:
 
 
 def _odeint(order: int) -> Solve:
-    """LSODA with its loop in compiled code, with BDF up to the given order."""
+    """Return LSODA with its loop in compiled code, with BDF up to the given order."""
 
     def solve(task: Task) -> tuple[np.ndarray, int]:
         f, j, rows = task.equations.rate, task.equations.jacobian, task.rows
@@ -92,7 +93,7 @@ def _odeint(order: int) -> Solve:
 
 
 def _cvode(order: int) -> Solve:
-    """CVODE's BDF up to the given order."""
+    """Return CVODE's BDF up to the given order."""
     from sksundae.cvode import CVODE  # pyright: ignore[reportMissingImports]  # of the extra "bench"
 
     def solve(task: Task) -> tuple[np.ndarray, int]:
@@ -118,7 +119,7 @@ NAMED = ("SciPy Radau", "SciPy BDF", "SciPy LSODA", "SUNDIALS CVODE")
 
 
 def peers() -> dict[str, Solve]:
-    """All peers by name; SUNDIALS is left out where scikit-sundae is not installed."""
+    """Return all peers by name, without SUNDIALS if scikit-sundae is not installed."""
     solvers = {
         "SciPy Radau": _solve_ivp("Radau"),
         "SciPy BDF": _solve_ivp("BDF"),
@@ -134,13 +135,13 @@ def peers() -> dict[str, Solve]:
 
 
 def at_once(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
-    """States over the whole run in one call; steps."""
+    """Return states over the whole run in one call, and steps."""
     times = rig.grid if sampled else rig.grid[[0, -1]]
     return solve(Task(rig, equations, rtol, rig.pieces, times, np.zeros(len(rig.scales))))
 
 
 def piecewise(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
-    """States over the run, each piece of the reference by itself; steps."""
+    """Return states over the run, with each piece of the reference solved separately, and steps."""
     start = np.zeros(len(rig.scales))
     ends = np.append(rig.pieces[1:, 0], rig.duration)
     parts, steps, grid = [start[None, :]], 0, rig.grid
@@ -156,7 +157,7 @@ def piecewise(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled:
 
 @dataclass
 class Run:
-    """What a peer did: its better form, wall times [s], positions on the grid, steps, and unsampled time [s]."""
+    """Result of a peer: its better way, wall times [s], positions on the grid, steps, unsampled time [s]."""
 
     form: str
     seconds: list[float]
@@ -170,7 +171,10 @@ FORMS: dict[str, Any] = {"whole": at_once, "pieces": piecewise}
 
 
 def race(solve: Solve, rig: Rig, equations: Compiled, rtol: float, repetitions: int) -> Run:
-    """Time a peer both ways, repeat the faster; a run beyond the time-out counts as that long."""
+    """Time a peer both ways, and repeat the faster one.
+
+    A run beyond the time-out counts as that long.
+    """
     runs = [_try(form, solve, rig, equations, rtol) for form in FORMS]
     best = min(runs, key=lambda run: run.seconds[0])
     if best.position is None:
@@ -203,7 +207,7 @@ def _timed(form: str, *arguments: Any) -> tuple[float, Any]:
 
 @contextmanager
 def time_out(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in the block after so many seconds; acts where Python code is called back."""
+    """Raise TimeoutError in the block after some seconds; it acts where Python code is called back."""
 
     def stop(*_: object) -> None:
         raise TimeoutError

@@ -1,4 +1,4 @@
-"""Work against precision: time of one run against the error it has, over a range of tolerances, as a plot."""
+"""Plot work against precision: time of one run against its error, over a range of tolerances."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.race import RUNS, Field, friso_seconds, friso_trace
 from benchmarks.report import clock, print_table
 
 LIMIT = 8.0
-"""Wall time of a run beyond which a method's tighter tolerances are left out [s]."""
+"""Wall time of a run [s] beyond which a method's tighter tolerances are left out."""
 
 Curve = list[tuple[float, float, float, float]]
 """Per tolerance: rtol, seconds per run and core, error of the trace [m], relative error of the amplitude."""
@@ -71,7 +71,10 @@ def _curve(place: Field, rtols: list[float], truth: Cycle, run: Callable[[float]
 
 
 def _equal_precision(methods: dict[str, Curve]) -> None:
-    """How many times longer each peer takes than friso to a trace as precise as its own (log-log interpolation)."""
+    """Print how many times longer each peer takes than friso for an equally precise trace.
+
+    Times are interpolated on logarithmic scales.
+    """
     work = np.log([point[1] for point in methods["friso"]])
     errors = np.log([point[2] for point in methods["friso"]])
     if np.any(np.diff(errors) >= 0):

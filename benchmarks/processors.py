@@ -1,7 +1,7 @@
-"""What lesser processors cost: `python -m benchmarks.processors`.
+"""Measure what lesser processors cost: `python -m benchmarks.processors`.
 
-The two maps of the prototype, on one core, with code for each processor that this machine can pretend to be, in turns;
-times as ratios to this machine's own, and the share of runs that come to the same outcome.
+It runs the two maps of the prototype, on one core, with code for each processor that this machine can imitate, in
+turns. Times are ratios to this machine's own; the fraction of runs with equal outcome is printed as well.
 """
 
 from __future__ import annotations
@@ -22,15 +22,18 @@ from benchmarks.two_maps import both_maps, friso_map
 from friso.engine.processor import PROCESSOR_VARIABLE, processor
 
 LEVELS = {"": "this machine", "x86-64-v4": "AVX-512", "x86-64-v3": "AVX2", "x86-64-v2": "SSE4.2", "x86-64": "SSE2"}
-"""Processors by LLVM's name, most able first, and what they are known for."""
+"""Processors by LLVM's name, most able first, and their usual names."""
 
 
 def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
-    """Least time [s] of each map on one core, and which of its runs swing, packed; in this process."""
+    """Return the least time [s] of each map on one core, and which of its runs swing, packed.
+
+    This runs in the present process.
+    """
     maps: dict[str, list[float | str]] = {}
     for case in both_maps(rig(True), rig(False)):
         times, peaks = [], np.zeros(0)
-        for _ in range(repetitions + 1):  # the first one warms up
+        for _ in range(repetitions + 1):  # the first run warms up
             start = time.process_time()
             peaks, _ = friso_map(case, rtol)
             times.append(time.process_time() - start)

@@ -1,4 +1,4 @@
-"""The feasibility prototype, `../shared/prototype/lanes.py`, where it is present; never copied into this repository."""
+"""Run the feasibility prototype, `../shared/prototype/lanes.py`, if present; it is never copied here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FILE = Path(__file__).parents[2] / "shared" / "prototype" / "lanes.py"
 
 
 def load() -> ModuleType | None:
-    """The prototype, compiled; None, with a note, where it is absent."""
+    """Return the prototype, compiled; None, with a note, if it is absent."""
     if not FILE.exists():
         print(f"  skipped: the prototype, {FILE} is absent")
         return None
@@ -32,7 +32,10 @@ def load() -> ModuleType | None:
 
 
 def run(module: ModuleType, rows: np.ndarray, rtol: float) -> tuple[np.ndarray, Any]:
-    """Run rows of parameters; steps (attempted, accepted) and the first run's maxima (times [s], heights [m])."""
+    """Run rows of parameters.
+
+    Returns steps (attempted, accepted), and the first run's maxima (times [s], heights [m]).
+    """
     n = len(rows)
     times, heights, counts = np.zeros((n, 2000)), np.zeros((n, 2000)), np.zeros(n, np.int64)
     steps = module.run_all(rows, 20.0, rtol, rtol * 1e-2, 0.05, 128, times, heights, counts)

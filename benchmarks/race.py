@@ -1,4 +1,4 @@
-"""friso, the prototype and the peers on one run of each rig, at the same tolerances."""
+"""Race friso, the prototype and the peers on one run of each rig, at equal tolerances."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from friso.platform.system import usable_cores
 RUNS = 512
 REFERENCE_RTOL = 1e-11
 WANTED = {1e-4: 2000.0, 1e-6: 1000.0}
-"""How many times faster than the fastest peer friso is to be, by rtol (issue 2)."""
+"""Wanted ratio of the fastest peer's time to friso's, by rtol (issue 2)."""
 
 CORES = usable_cores()
 
@@ -42,7 +42,7 @@ class Entry:
 
 @dataclass
 class Field:
-    """What a race needs: the rig, its equations for the peers, the peers, the prototype, the reference trace."""
+    """Inputs of a race: rig, its equations for the peers, the peers, the prototype, the reference trace."""
 
     rig: Rig
     equations: Compiled
@@ -54,30 +54,36 @@ class Field:
 
 
 def reference_trace(rig: Rig, equations: Compiled, radau: Any) -> np.ndarray:
-    """Position [m] on the grid by SciPy Radau at rtol 1e-11, piece by piece; independent of friso's engine."""
+    """Return positions [m] on the grid by SciPy Radau at rtol 1e-11, piece by piece.
+
+    They do not depend on friso's engine.
+    """
     states, _ = piecewise(radau, rig, equations, REFERENCE_RTOL, True)
     return states[:, rig.kernel.states.index("position")]
 
 
 def friso_trace(rig: Rig, rtol: float) -> tuple[np.ndarray, Any]:
-    """friso's positions on the grid [m] and its results, of a single run."""
+    """Return friso's positions on the grid [m] and its results, for a single run."""
     (runs,) = run_chunks(rig.kernel, rig.flat, 1, RunOptions(rtol=rtol, interval=SAMPLE, budget=10_000_000))
     return runs.results.samples[0][:, rig.kernel.states.index("position")], runs
 
 
 def friso_seconds(rig: Rig, rtol: float, runs: int, threads: int, spread_share: float = 0.0) -> float:
-    """Wall time [s] times threads over runs, of a batch; `spread_share` makes the crossovers differ by as much."""
+    """Return wall time [s] times threads over runs, for a batch.
+
+    `spread_share` is the relative spread of the crossovers.
+    """
     flat = dict(rig.flat)
     if spread_share:
         flat["controller.crossover"] = flat["controller.crossover"] * np.linspace(
             1 - spread_share, 1 + spread_share, runs
         )
-    options = measures.measuring_options(rtol, threads)  # as a sweep runs it
+    options = measures.measuring_options(rtol, threads)  # as in a sweep
     return clock(lambda: list(run_chunks(rig.kernel, flat, runs, options))) * threads / runs
 
 
 def run_race(place: Field) -> list[Goal]:
-    """Race on one rig at both tolerances; prints the tables, returns the goals."""
+    """Race on one rig at both tolerances; print the tables, return the goals."""
     goals: list[Goal] = []
     for rtol in RTOLS:
         entries = [*_lanes(place, rtol), *_peers(place, rtol)]
@@ -88,7 +94,7 @@ def run_race(place: Field) -> list[Goal]:
 
 
 def _lanes(place: Field, rtol: float) -> list[Entry]:
-    """friso and the prototype, timed in turns."""
+    """Return friso and the prototype, timed in turns."""
     rig, module = place.rig, place.prototype
     times: dict[str, list[float]] = {}
     jobs: dict[str, Callable[[], float]] = {}

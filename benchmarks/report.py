@@ -1,4 +1,4 @@
-"""Printing: tables of text, and the goals with what was measured."""
+"""Print tables of text, and the goals with what was measured."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.platform.system import usable_cores
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal: what it is about, the target, what was measured, and whether that reaches it (None: information)."""
+    """A goal: its subject, the target, the measured value, and whether it is reached (None: information)."""
 
     about: str
     target: str
@@ -46,19 +46,19 @@ def print_goals(goals: Sequence[Goal], title: str) -> None:
 
 
 def clock(job: Callable[[], Any]) -> float:
-    """Wall time of a job [s]."""
+    """Return the wall time of a job [s]."""
     start = time.perf_counter()
     job()
     return time.perf_counter() - start
 
 
 def spread(seconds: Sequence[float], scale: float = 1.0, digits: int = 1) -> str:
-    """Least and median of some times, times `scale`."""
+    """Return least and median of some times, multiplied by `scale`, as text."""
     return f"{min(seconds) * scale:.{digits}f} / {statistics.median(seconds) * scale:.{digits}f}"
 
 
 def machine(libraries: Sequence[ModuleType]) -> str:
-    """The versions of libraries, the processor, its cores that may be used, and the load of the last minute."""
+    """Describe the machine: versions of libraries, processor, usable cores, and load of the last minute."""
     versions = [f"{library.__name__} {library.__version__}" for library in libraries]
     file = Path("/proc/cpuinfo")
     lines = file.read_text().splitlines() if file.exists() else []

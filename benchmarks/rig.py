@@ -1,7 +1,8 @@
-"""The drive as built against the continuous loop, on the same stage, by ``python -m benchmarks.rig``.
+"""Time the real drive against the continuous loop, on the same stage: ``python -m benchmarks.rig``.
 
-Time of one core per run in a sweep: examples/thesis_drive.toml with all its parts (delay, current loop, rail, cable,
-noise), on a rail of its own each, the joint locked and free; made and logged as the experiments of ``friso rig`` do.
+It measures the time of one core per run in a sweep of examples/thesis_drive.toml with all its parts (delay, current
+loop, rail, cable, noise). Each run has its own rail; the joint is locked and free. Runs are made and logged as in the
+experiments of ``friso rig``.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from friso.virtual_rig.settings import RigSettings
 FILE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 RUNS = 32
 WANTED = 60.0
-"""Milliseconds per run of 400 000 samples."""
+"""Wanted time per run of 400 000 samples [ms]."""
 
 
 def sampled(stage: Stage) -> Callable[[], object]:
-    """The move of the stage with its drive, on so many rails."""
+    """Return a function that runs the move of the stage with its drive on many rails."""
     rails = {"rail.seed": np.arange(1.0, RUNS + 1)}
     return lambda: list(run(stage, move(stage), range(RUNS), INTERVAL, rails, threads=1))
 
 
 def continuous(stage: Stage) -> Callable[[], object]:
-    """As many runs of the stage's own motion without a drive."""
+    """Return a function that runs the stage's own motion as often without a drive."""
     shape, options = (
         kernel(structure(stage.flat())),
         RunOptions(rtol=RigSettings.current().rig_rtol, interval=INTERVAL, threads=1),
@@ -43,7 +44,7 @@ def continuous(stage: Stage) -> Callable[[], object]:
 
 
 def run_rigs(repetitions: int) -> list[Goal]:
-    """Milliseconds per run, side by side."""
+    """Measure milliseconds per run, side by side."""
     rows, goals = [], []
     for name, locked in (("locked", True), ("free", False)):
         stage = with_joint(load(FILE), locked)

@@ -1,16 +1,15 @@
-"""The loop from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
+"""Test the way from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
 
-Machines drawn at random with their drives as built (tests/rig_machines.py) go through the experiments of `friso rig`:
+Machines drawn at random with their real drives (tests/rig_machines.py) go through the experiments of `friso rig`:
 frequency responses with the joint locked and free, steps, slow motion, and with the joint locked many speeds, slow
 sliding and small motion before sliding. Their logs are written as text, read back as `friso identify` does, and
-identified with what an owner knows as `--stage`. All but the free response make one stage file; that is identified by
-itself, since one bench at a time can be.
+identified with what an owner knows as `--stage`. All but the free response make one stage file; the free response is
+identified separately, because a machine can be on one bench at a time.
 
-Per experiment and quantity: how often the 95 % interval holds the truth; and how often `friso check` on the identified
-stage gives the verdict that it gives on the machine. A machine has one rail: what counts as the truth of static and
-Coulomb friction is their mean along the stretches of it where the cart went in the experiment at hand; in the stage
-file and for the verdict, along the travel of the machine's own motion. Of everything else it is the machine's own
-value.
+For each experiment and quantity it prints how often the 95 % interval holds the truth; and how often `friso check` on
+the identified stage gives the machine's verdict. A machine has one rail. For an experiment, the true static and Coulomb
+friction are means along the stretches where its cart went; in the stage file and for the verdict, they are means along
+the travel of the machine's own motion. All other true values are the machine's own.
 """
 
 from __future__ import annotations
@@ -46,19 +45,20 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files
 
 PLACES, POINTS = 3, 1000
-"""Places of the frequency responses and of the motion before sliding; points of the travel for its mean friction."""
+"""Numbers of places for the frequency responses and the motion before sliding, and of points along the travel for its
+mean friction."""
 
 SAME = 0.95
-"""Share of the verdicts that have to be those of the machines."""
+"""Fraction of the verdicts that must equal those of the machines."""
 
 LEVELS = ("friction.static", "friction.coulomb")
 
 Verdicts = dict[str, Counter[tuple[str, str]]]
-"""Per case how often which verdict of the machine came back as which."""
+"""For each case, how often each verdict on the machine became which verdict on the identified stage."""
 
 
 def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
-    """The logs that are identified together."""
+    """Return the groups of logs that are identified together."""
     stage, noise = machine.truth, 1000 * (seed + 1)
     low, high = travel(stage)
     places = [low + (high - low) * number / (PLACES - 1) for number in range(PLACES)]
@@ -79,7 +79,10 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
 
 
 def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stage]:
-    """What the files of logs show, and the stage file that comes of it. The owner tells the stroke of the fixtures."""
+    """Identify files of logs; return the result and its stage file.
+
+    The owner states the stroke of the fixtures.
+    """
     wide = {"joint.stroke": freed(machine.truth).flat()["joint.stroke"]}
     with tempfile.TemporaryDirectory() as folder:
         recorded = through_files(logs, Path(folder))
@@ -91,13 +94,13 @@ def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stag
 
 
 def on_its_rail(machine: Machine) -> Stage:
-    """The machine on an even rail that has the mean friction of its own along the travel."""
+    """Return the machine on an even rail with the mean friction of its own rail along the travel."""
     factors = friction_factors(machine.flat, np.linspace(*travel(machine.truth), POINTS)).mean(axis=1)
     return machine.truth.with_numbers({key: machine.flat[key] * by for key, by in zip(LEVELS, factors, strict=True)})
 
 
 def answers(identified: Identification, logs: list[RigLog], machine: Machine) -> Iterator[Answer]:
-    """What each experiment shows, and what all together show, with the truth."""
+    """Yield the answers of each experiment, and of all together, with the truth."""
     flat, travelled = machine.flat, on_its_rail(machine).flat()
     for experiment in identified.experiments:
         matching = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in experiment.logs}]
@@ -145,7 +148,7 @@ def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> N
 
 
 def same(verdicts: Verdicts) -> list[Goal]:
-    """The goals about the verdicts."""
+    """Return the goals about the verdicts."""
     reached = []
     for case, pairs in verdicts.items():
         right, total = sum(n for (true, back), n in pairs.items() if true == back), pairs.total()

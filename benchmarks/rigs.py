@@ -1,4 +1,4 @@
-"""The two rigs that are raced: the thesis rig with its joint locked and free, at a crossover of 8 Hz."""
+"""Define the two rigs that are raced: the thesis rig with its joint locked and free, at 8 Hz."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from friso.stage import Stage
 FILE = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
 RTOLS = (1e-4, 1e-6)
 SAMPLE = 1e-3
-"""Interval at which every method hands over its trace [s]."""
+"""Interval [s] at which every method returns its trace."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,15 @@ class Rig:
 
     @property
     def duration(self) -> float:
-        """Length of the run [s]."""
+        """Return the length of the run [s]."""
         return float(self.flat["motion.duration"])
 
     @property
     def grid(self) -> np.ndarray:
-        """Sampling instants [s], shape (samples,); a corner of the reference close to one takes its place."""
+        """Return the sampling instants [s], shape (samples,).
+
+        A corner of the reference replaces a nearby instant.
+        """
         grid = np.arange(round(self.duration / SAMPLE) + 1) * SAMPLE
         for corner in self.pieces[1:, 0]:
             nearest = int(np.argmin(np.abs(grid - corner)))
@@ -52,19 +55,19 @@ class Rig:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Value [SI] of every parameter of the equations."""
+        """Return the value [SI] of every parameter of the equations."""
         numbers = {**self.flat, "motion.size": motion.size(self.flat)}
         return {name: float(numbers[name]) for name in self.kernel.parameters}
 
 
 def rig(locked: bool) -> Rig:
-    """The thesis rig, locked or free."""
+    """Return the thesis rig, locked or free."""
     stage = friso.load(FILE).replace({"joint.locked": locked, "controller.crossover": "8 Hz"})
     return rig_of(stage, "locked" if locked else "free")
 
 
 def rig_of(stage: Stage, name: str = "") -> Rig:
-    """The rig that a stage describes."""
+    """Return the rig that a stage describes."""
     flat = stage.flat()
     shape = kernel(structure(flat))
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)

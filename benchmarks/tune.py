@@ -1,13 +1,13 @@
-"""The cure held against a brute search: `python -m benchmarks.tune [--axes N ...] [--settings N] [--fresh N]`.
+"""Compare tuning with a brute-force search: `python -m benchmarks.tune`.
 
-Axes with four controllers, three levels of friction, without and with a parasitic mode (24, by their numbers) are tuned
-way by way, the joint kept. A Sobol sequence of settings over the same ranges is measured by the same moves and margins
-on the same machines, and the best of those with which nothing attracts machines, and which meet the goal on a hundred
-others, as is asked of the tuned one, is compared with it in the settling time of the slowest twentieth. Where nothing
-was tuned that works, whatever the brute search comes upon counts as missed. All tuned stages, the least change too, are
-measured on fresh machines, and the share is counted of those that meet the goal. `--thesis` tunes the rig of the thesis
-instead; `--findings` tries on it what is said of friction isolators: that they narrow the stable range of gains, and
-that they help less at some step sizes.
+Options are `[--axes N ...] [--settings N] [--fresh N]`. Axes with four controllers, three levels of friction, without
+and with a parasitic mode (24, by their numbers) are tuned remedy by remedy, the joint kept. A Sobol sequence of
+settings over the same ranges is measured by the same moves and margins on the same machines. The best setting at which
+no machine hunts, and which meets the goal on a hundred others, is compared with the tuned one in the settling time of
+95 %. If tuning found nothing, anything that the brute search finds counts as missed. All tuned stages, including the
+least change, are measured on fresh machines, and the fraction that meets the goal is counted. `--thesis` tunes the rig
+of the thesis instead; `--findings` tests on it two statements about friction isolators: that they narrow the stable
+range of gains, and that they help less at some step sizes.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ LEVELS = (0.5, 1.0, 2.0)
 """Factors of all friction forces."""
 
 LIMIT, WITHIN, ALIKE = 30.0, 2e-6, 1.05
-"""Limit of the bandwidth [Hz], tolerance [m], and the factor within which the tuned settling time has to be."""
+"""Limit of the bandwidth [Hz], tolerance [m], and largest ratio of the tuned settling time to the best one."""
 
 JOINT = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 MODE = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 0.01}
@@ -79,17 +79,17 @@ MODE = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 0.01}
 HEAD = ("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "CPU")
 
 CHUNK, BATCH, PART = 1024, 8, 1000
-"""Settings that are measured, and surveyed, at once, and fresh machines."""
+"""Settings that are measured, and surveyed, at once; and number of fresh machines at once."""
 
 NEVER = 1e3
-"""A settling time beyond any run [s]."""
+"""Settling time [s] beyond any run."""
 
 BEYOND = 1.3
-"""The brute search keeps settings that take up to so many times as long as the tuned ones."""
+"""Ratio to the tuned settling time up to which the brute search keeps settings."""
 
 
 def axes() -> Iterator[tuple[str, Stage]]:
-    """All of them: four structures of controller, three levels of friction, without and with the mode."""
+    """Yield all axes: four structures of controller, three levels of friction, without and with the mode."""
     for level, mode in product(LEVELS, (False, True)):
         for name, controller in CONTROLLERS.items():
             stage = loads(AXIS + controller)
@@ -101,10 +101,12 @@ def axes() -> Iterator[tuple[str, Stage]]:
 
 
 def brute(search: Search, count: int, most: float) -> float:
-    """The best settling time [s] below `most` of so many settings that keep all constraints, have nothing that attracts
-    and meet the goal on enough fresh machines; infinite where none is. It is exact: among so few machines the slowest
-    twentieth is the slowest one, so a setting goes no further once it is too slow, or breaks a constraint, on one of
-    them."""
+    """Return the best settling time [s] below `most`, infinite if there is none.
+
+    Settings must keep all constraints, must not hunt, and must meet the goal on enough fresh machines. It is exact:
+    among so few machines the 95 % settling time is that of the slowest one, so a setting is dropped once it is too
+    slow, or breaks a constraint, on one of them.
+    """
     shares = qmc.Sobol(len(search.remedy.variables), rng=0).random(count)
     chunks = np.array_split(shares, max(1, count // CHUNK))
     stage, remedy = search.remedy.stage, search.remedy
@@ -125,19 +127,22 @@ def brute(search: Search, count: int, most: float) -> float:
 
 
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Moves, margins and what attracts, with sampling and delay of the stage `drive` for the margins."""
+    """Measure moves, margins and attractors, with sampling and delay of the stage `drive` for the margins."""
     return moving(stage, machines, goal, drive).surveyed(stage, machines, goal)
 
 
 def meeting(stage: Stage, fresh: Fleet, goal: Goal, drive: Stage) -> float:
-    """The share of fresh machines that meet the goal with a stage."""
+    """Return the fraction of fresh machines that meet the goal with a stage."""
     parts = np.array_split(np.arange(fresh.count), max(1, fresh.count // PART))
     shares = [performance_of(stage, fresh.take(part), goal, drive).share(goal).probability for part in parts]
     return float(np.average(shares, weights=[len(part) for part in parts]))
 
 
 def times_on(search: Search, shares: np.ndarray, machine: Fleet, most: float) -> np.ndarray:
-    """The settling times [s] of settings on one machine; infinite from `most` on, and where a constraint is broken."""
+    """Return the settling times [s] of settings on one machine.
+
+    They are infinite from `most` on, and if a constraint is broken.
+    """
     remedy, goal, times = search.remedy, search.goal, np.full(len(shares), np.inf)
     if not len(shares):
         return times
@@ -152,7 +157,7 @@ def times_on(search: Search, shares: np.ndarray, machine: Fleet, most: float) ->
 
 
 def thesis() -> None:
-    """The thesis's rig at 8 Hz: bandwidth and isolator with their prices, and its own design (Sec. 3.4)."""
+    """Tune the thesis's rig at 8 Hz: bandwidth and isolator with their costs, and its own design (Sec. 3.4)."""
     rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
     locked, free = rig.replace({"joint.locked": True}), rig.replace({"joint.locked": False})
     goal = Goal(bandwidth_limit=25.0)
@@ -182,8 +187,11 @@ def thesis() -> None:
 
 
 def findings() -> None:
-    """The rig with its joint locked and free: the crossovers that are stable and keep a modulus margin of 0.5, and how
-    soon steps of many sizes settle at a crossover at which neither hunts, and at one at which the locked one does."""
+    """Test the rig with its joint locked and free.
+
+    It finds the crossovers that are stable and keep a modulus margin of 0.5, and how soon steps of many sizes settle:
+    at a crossover at which neither hunts, and at one at which the locked one does.
+    """
     rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
     stages = {name: rig.replace({"joint.locked": name == "locked"}) for name in ("locked", "free")}
     rows = []
@@ -203,7 +211,7 @@ def findings() -> None:
 
 
 SIZES, STEPS, CROSSOVERS = (1e-5, 1e-1), 25, (8, 12)
-"""Ends of the step sizes [m], how many are tried, and at which crossovers [Hz]."""
+"""Ends of the step sizes [m], their number, and the crossovers [Hz]."""
 
 
 def main() -> None:
@@ -234,7 +242,7 @@ def main() -> None:
         fresh = draw_fleet(stage, Correlations(), options.fresh, 77, goal.moves)
         for outcome in advice.outcomes:
             tuned_stage = outcome.stage if outcome.certainty == "works" else None
-            compared, share = ("", "", ""), ""  # the least change is not the one that settles soonest
+            compared, share = ("", "", ""), ""  # the least change does not settle soonest
             if outcome.remedy.name in {*options.ways} - {BANDWIDTH}:
                 search = Search(outcome.remedy, goal, machines, advice.machines, stage, Budget(), lambda label: None)
                 tuned = float(search.measured(outcome.shares[None]).settling[0]) if tuned_stage else np.inf

@@ -1,4 +1,4 @@
-"""The two 41 x 41 maps of the prototype, timed for friso and the prototype in turns."""
+"""Time the two 41 x 41 maps of the prototype, for friso and the prototype in turns."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks
 from friso.hunting.measures import RESOLVED, measure_runs, measuring_options
 
 STRICT = 1e-9
-"""rtol whose verdicts the others are compared with."""
+"""Relative tolerance whose verdicts serve as the reference."""
 
 MOST_REJECTED = 0.15
 
 
 @dataclass(frozen=True)
 class Map:
-    """A map: name, rig with the equations, friso's flat form of all cells, the prototype's, wanted agreement."""
+    """A map: name, rig with its equations, friso's flat form of all cells, the prototype's, wanted agreement."""
 
     name: str
     rig: Rig
@@ -34,7 +34,10 @@ class Map:
 
 
 def both_maps(locked: Rig, free: Rig) -> list[Map]:
-    """Locked, crossover 1 to 40 Hz x total mass 0.1 to 5.1 kg; free, crossover 1 to 16 Hz x stroke 1e-6 to 1e-3 m."""
+    """Return both maps.
+
+    Locked: crossover 1 to 40 Hz over total mass 0.1 to 5.1 kg; free: crossover 1 to 16 Hz over stroke 1e-6 to 1e-3 m.
+    """
     mass, crossover = (v.ravel() for v in np.meshgrid(np.linspace(0.1, 5.1, 41), np.linspace(1, 40, 41), indexing="ij"))
     by_mass = {
         **locked.flat,
@@ -56,7 +59,7 @@ def both_maps(locked: Rig, free: Rig) -> list[Map]:
 
 
 def friso_map(case: Map, rtol: float) -> tuple[np.ndarray, float]:
-    """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
+    """Return peak counts of all cells, and the rejected fraction of steps: the prototype's work."""
     settings = RunOptions(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=RESOLVED)
     chunks = list(run_chunks(case.rig.kernel, case.flat, len(case.prototype), settings))
     peaks = np.empty(len(case.prototype))
@@ -83,7 +86,7 @@ def _measured_map(case: Map, rtol: float) -> None:
 
 
 def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) -> list[Goal]:
-    """Time both maps at both tolerances; prints a table, returns the goals."""
+    """Time both maps at both tolerances; print a table, return the goals."""
     goals: list[Goal] = []
     rows = []
     for case in maps:
@@ -119,7 +122,7 @@ def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) ->
 def _times(
     case: Map, prototype: ModuleType | None, lanes: list[Any], rtol: float, repetitions: int
 ) -> dict[str, list[float]]:
-    """Wall times [s] of friso, friso with all measures, and the prototype, taken in turns."""
+    """Return wall times [s] of friso, friso with all measures, and the prototype, taken in turns."""
     jobs: dict[str, Any] = {
         "friso": lambda: friso_map(case, rtol),
         "measured": lambda: _measured_map(case, rtol),

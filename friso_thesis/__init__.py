@@ -1,1 +1,4 @@
-"""The thesis behind friso, recomputed and judged, and its design guideline: a package that plugs into friso."""
+"""Recompute and judge the thesis behind friso, and its design guideline.
+
+This package plugs into friso.
+"""

@@ -1,6 +1,8 @@
-"""Stages under the laws of several kinds of bristle, by hand from the papers and event by event: SciPy's Radau, stopped
-where the velocity passes zero, an element reaches its limit, or the stroke limiter is touched or left. Nothing is
-shared with friso but the names of keys."""
+"""Write stages under laws with several kinds of bristle by hand, from the papers, event by event.
+
+SciPy's Radau is stopped where the velocity passes zero, an element reaches its limit, or the stroke limiter is touched
+or left. Only the names of keys are shared with friso.
+"""
 
 from __future__ import annotations
 
@@ -16,20 +18,23 @@ X, V, XC, VC, LOW, INTEGRAL, BRISTLES = range(7)
 LAWS = ("dahl", "elasto_plastic", "rolling", "gms")
 JOINTS = ("rigid", "locked", "free")
 ROUNDED = 1e-4
-"""Share of the level below which bristles of rolling friction give way in proportion (docs/friction.md)."""
+"""Fraction of the level below which bristles of rolling friction give way in proportion (docs/friction.md)."""
 
 ROUNDING = 1e-7
-"""Share of its limit by which an element may lack and slip at the start: a state says it no better."""
+"""Fraction of its limit by which an element may fall short and still slip at the start, the accuracy of a state."""
 
 EVENTS = 20_000
-"""Events that a run may have."""
+"""Most events of a run."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """The equations of a stage whose reference stays at 0; `numbers` in the order of `_rates`, and of its elements
-    stiffness [N/m], share and damping [N s/m]. States: position and velocity of the stage, of the cart (those of a
-    rigid stage stay 0), filtered error, integral, deflections of the bristles [m]."""
+    """Equations of a stage whose reference stays at 0.
+
+    `numbers` are in the order of `_rates`; elements have stiffness [N/m], share and damping [N s/m]. States are
+    position and velocity of the stage and of the cart (the latter stay 0 for a rigid stage), filtered error, integral,
+    and deflections of the bristles [m].
+    """
 
     law: str
     joint: str
@@ -39,19 +44,21 @@ class Stage:
     last: dict[str, Any] = field(default_factory=dict)
 
     def state(self, names: Mapping[str, float]) -> np.ndarray:
-        """The states of friso by their names."""
+        """Return friso's states by their names as states of this module."""
         order = ["position", "velocity", "cart_position", "cart_velocity", "filtered_error", "integral"]
         bristles = [name for name in names if "deflection" in name]
         return np.array([names.get(name, 0.0) for name in (*order, *bristles)])
 
     def run(self, y: np.ndarray, duration: float, rtol: float) -> tuple[np.ndarray, np.ndarray, float, float]:
-        """States at the end of a run from a state, their rates there, and the highest and
-        lowest position [m] on the way."""
+        """Run the stage from a state.
+
+        Returns the states at the end, their rates there, and the highest and lowest position [m] on the way.
+        """
         body = V if self.joint == "rigid" else VC
         slips = np.zeros(len(self.elements[0]))
         t, y, touch = 0.0, np.array(y, dtype=float), self._touches(y)
         way = float(np.sign(y[body])) or float(np.sign(self._rates(y, slips, 1.0, touch)[body]))
-        if self.law == "gms":  # what bears its share slips on
+        if self.law == "gms":  # an element at its share continues to slip
             bearing = [self._lacks(y, n, way, body) for n in range(len(slips))]
             slips = (np.array(bearing) <= ROUNDING * self.elements[1] * _level(y[body], self.numbers)).astype(float)
         high = low = y[X]
@@ -87,7 +94,7 @@ class Stage:
         return float(np.sign(gap)) if self.joint == "free" and abs(gap) > stroke else 0.0
 
     def _surfaces(self, body: int, slips: np.ndarray, way: float, touch: float) -> list[tuple[Any, str]]:
-        """What falls through 0 where something happens, and what that is."""
+        """Return functions that fall through 0 at an event, each with the event's name."""
         surfaces: list[tuple[Any, str]] = [(lambda t, y: way * y[body], "turns")]
         if self.law == "gms":
             for n in np.flatnonzero(slips == 0):
@@ -101,7 +108,7 @@ class Stage:
         return surfaces
 
     def _lacks(self, y: np.ndarray, n: int, way: float, body: int) -> float:
-        """By how much the force of an element, along the motion, is below its share of the level [N]."""
+        """Return by how much the force of an element along the motion is below its share of the level [N]."""
         stiffness, share, _ = self.elements
         return float(share[n] * _level(y[body], self.numbers) - way * stiffness[n] * y[BRISTLES + n])
 
@@ -110,7 +117,10 @@ STROKE = 10
 
 
 def by_hand(flat: Mapping[str, Any]) -> Stage:
-    """The equations of a stage given as flat keys to SI numbers: van Dijk's rules (Eq. 7, 8), no limit, no bias."""
+    """Return the equations of a stage given as flat keys to SI numbers.
+
+    The controller follows van Dijk's rules (Eq. 7, 8), without limit or bias.
+    """
     law = flat["friction.model"]
     joint = "rigid" if "joint.stiffness" not in flat else "locked" if flat["joint.locked"] else "free"
     count = sum(key.startswith("friction.element_stiffness.") for key in flat)

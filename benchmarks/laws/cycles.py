@@ -1,5 +1,8 @@
-"""The cycles that friso closes by shooting, followed by SciPy: whether they close, how large they are, how a deviation
-grows; and by brute force at two tolerances."""
+"""Follow with SciPy the cycles that friso closes by shooting.
+
+The tests ask whether they close, how large they are, and how a deviation grows. Brute force repeats this at two
+tolerances.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +17,25 @@ from benchmarks.truth.claims import Claim
 from friso.hunting import Cycles, Ensemble
 
 RTOL, BRUTE = 1e-9, (1e-7, 1e-9)
-"""Tolerance of SciPy, and those of the simulations by brute force."""
+"""Tolerance of SciPy, and tolerances of the simulations by brute force."""
 
 AWAY = 1e-4
-"""Share of the distance at which a stage sticks by which a run begins beside its cycle."""
+"""Distance from its cycle at which a run begins, as a fraction of the distance at which the stage sticks."""
 
 GAP, SIZE, GROWTH = 1e-5, 1e-4, 2e-3
-"""By how much an orbit may fail to close, as a share of its states' magnitudes; amplitudes may differ; and multipliers
-may."""
+"""Largest gap of an orbit, relative to its states' magnitudes; largest difference of amplitudes; and of multipliers."""
 
 PERIODS, KEPT = 6, 0.02
-"""Periods for which brute force follows a cycle that attracts, and the share of its amplitude that it keeps to."""
+"""Periods for which brute force follows a stable cycle, and the largest deviation from its amplitude."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A cycle of a claim: amplitude [m], multiplier, the share by which SciPy finds it open, and its amplitude over,
-    friso's; the multiplier that SciPy finds (NaN where a limiter chatters), and by how much the amplitude differs by
-    brute force, as a share."""
+    """A cycle of a claim, with what SciPy and brute force find.
+
+    It has amplitude [m] and multiplier; SciPy's gap, its amplitude over friso's, and its multiplier (NaN where a
+    limiter chatters); and the relative difference of the amplitude by brute force.
+    """
 
     case: str
     amplitude: float
@@ -43,7 +47,7 @@ class Shown:
 
     @property
     def wrong(self) -> str:
-        """What refutes the cycle; "" where nothing does."""
+        """Return what refutes the cycle; "" if nothing does."""
         reasons = []
         if not self.gap < GAP:
             reasons.append(f"it does not close, by {self.gap:.2g}")
@@ -58,7 +62,7 @@ class Shown:
 
 @np.errstate(all="ignore")
 def cycles_of(claim: Claim, surveyed: Any) -> Iterator[Shown]:
-    """The cycles of a claim, those that repel too."""
+    """Yield the cycles of a claim, including unstable ones."""
     families = [family for family in surveyed.families if family.closed[0] and not family.attracting[0]]
     closed = [m.cycles.take(np.array([m.number])) for m in surveyed.motions if m.cycles is not None]
     for cycle in (*closed, *families):
@@ -88,13 +92,18 @@ def _shown(claim: Claim, cycle: Cycles) -> Shown:
 
 
 def _on_section(end: np.ndarray, rates: np.ndarray, sign: float, start: np.ndarray) -> np.ndarray:
-    """Where a run that ended beside the section, on which the integrator's state is that of the start, crosses it; the
-    mirror image of half a period."""
+    """Return where a run that ended beside the section crosses it.
+
+    On the section the integrator's state equals that of the start, or of its mirror image for half a period.
+    """
     return sign * end - sign * rates * (sign * end[5] - start[5]) / (sign * rates[5])
 
 
 def _brute(ensemble: Ensemble, cycle: Cycles) -> float:
-    """By how much the amplitude after some periods differs, at most, at two tolerances; 0 of a cycle that repels."""
+    """Return the largest difference of the amplitude after some periods, at two tolerances.
+
+    It is 0 for an unstable cycle.
+    """
     if not cycle.attracting[0]:
         return 0.0
     period, off = float(cycle.period[0]), []

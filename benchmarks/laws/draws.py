@@ -1,4 +1,4 @@
-"""Stages drawn at random under a friction law: those of `benchmarks.truth` with LuGre, their friction replaced."""
+"""Draw stages at random under a friction law: those of `benchmarks.truth` with LuGre, friction replaced."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
 
 JOINTS = (Form("rigid"), Form("free"), Form("locked"))
-"""What is drawn of the structures there."""
+"""Structures that are taken from `benchmarks.truth`."""
 
 ELEMENTS = {"rigid": 4, "free": 2, "locked": 6}
-"""Elements of a law with several: one number a structure, since every number is a kernel to compile."""
+"""Number of elements of a law with several, one for each structure, because each number needs a kernel."""
 
 
 def numbers(stages: int) -> list[int]:
-    """The numbers of the first stages with LuGre friction, a van Dijk controller and nothing else."""
+    """Return the numbers of the first stages with LuGre friction, a van Dijk controller and nothing else."""
     return list(islice((n for n in count() if FORMS[n % len(FORMS)] in JOINTS), stages))
 
 
 def under(law: str, seed: int, number: int) -> Stage:
-    """The stage with this number under a law whose shape before sliding is drawn too, not that of LuGre."""
+    """Return the stage with a number under a law, with a shape before sliding drawn for that law."""
     stage, rng = draw(seed, number), np.random.default_rng([seed, number, 11])
     joint = FORMS[number % len(FORMS)].joint
     measured = friction_law("lugre").shown(stage.flat())
@@ -34,7 +34,7 @@ def under(law: str, seed: int, number: int) -> Stage:
 
 
 def _shape(law: str, keys: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
-    """Keys that a law leaves to what happens before sliding, anywhere within their ranges."""
+    """Draw the keys that decide only on motion before sliding, anywhere within their ranges."""
     if law == "elasto_plastic":
         most = keys["friction.coulomb"] / keys["friction.bristle_stiffness"]
         return {"friction.breakaway_deflection": float(rng.uniform(0.05, 0.95)) * most}

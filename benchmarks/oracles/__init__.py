@@ -1,1 +1,1 @@
-"""Facts about hunting that nobody here made, beside what friso answers: `python -m benchmarks.oracles`."""
+"""Compare friso's answers with facts about hunting from other sources: `python -m benchmarks.oracles`."""

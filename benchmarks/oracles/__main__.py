@@ -1,8 +1,8 @@
-"""Asks friso what oracles know that nobody here made: `python -m benchmarks.oracles`.
+"""Ask friso for facts that others have established: `python -m benchmarks.oracles`.
 
-Every oracle states a fact, its source and the sense in which friso has to agree, and prints both answers. `--only` asks
-one of them, `--table` writes the page [Oracles](oracles.md): what was not asked stays on it as it was. `--grow` adds
-stages to the set with edges by brute force, for so many seconds; it goes on where it stopped.
+Every oracle states a fact, its source, and the sense in which friso has to agree, and prints both answers. `--only`
+asks one oracle. `--table` writes the page [Oracles](oracles.md), and keeps the sections of oracles that were not asked.
+`--grow` adds stages to the set with edges by brute force, for some seconds; it continues where it stopped.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Friso's cycles, multipliers and bifurcations beside those of SciPy (`orbits.py`)."""
+"""Compare friso's cycles, multipliers and bifurcations with those of SciPy (`orbits.py`)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ CROSSOVERS = 4.0, 8.0
 RANGE = KeyRange("controller.crossover", 7.0, 18.0, unit="Hz")
 
 POINTS = (("flip", -1.0, 9.76995), ("fold", -1.0, 16.2239), ("fold", 1.0, 8.47086), ("flip", 1.0, 8.47178))
-"""Bifurcations that references.md has, section 5: kind, sign of the orbit (-1: symmetric) and crossover [Hz]."""
+"""Bifurcations in section 5 of references.md: kind, sign of the orbit (-1: symmetric) and crossover [Hz]."""
 
 STATES = ("position", "velocity", "bristle_deflection", "filtered_error", "integral")
 """Friso's names of the states of `orbits.rates`."""
 
 
 def stage(crossover: float) -> Stage:
-    """The mass of `orbits.py` as a stage file has it."""
+    """Return the mass of `orbits.py` as a stage."""
     return Stage(
         name="rigid mass of 1.7 kg",
         masses={"cart": "1.2 kg", "stage": f"{orbits.MASS - 1.2:.1f} kg"},
@@ -72,7 +72,7 @@ def bifurcations() -> Iterator[Finding]:
 
 
 def nearest(over: Diagram, kind: str, sign: float, crossover: float) -> LocatedPoint:
-    """The special point of a kind that lies next to a crossover."""
+    """Return the special point of a kind nearest to a crossover."""
     points = [
         point
         for branch, own in zip(over.branches, over.special, strict=True)
@@ -83,7 +83,10 @@ def nearest(over: Diagram, kind: str, sign: float, crossover: float) -> LocatedP
 
 
 def beginning(point: LocatedPoint, crossover: float) -> orbits.Orbit:
-    """Where the search of `orbits.located` begins: friso's own orbit, taken to where it passes the reference."""
+    """Return friso's own orbit, taken to where it passes the reference.
+
+    The search of `orbits.located` begins there.
+    """
     cycle: Cycles = point.point.cycle
     names: list[Any] = [*Ensemble.held(stage(crossover).flat(), 1).kernel.states]
     state = np.array([cycle.states[0][names.index(name)] for name in STATES])

@@ -1,7 +1,8 @@
-"""MuJoCo's LuGre bristles: an exact hold over each time step, so that a run errs in proportion to the step.
+"""Compare with MuJoCo's LuGre bristles, which are held exactly over each time step.
 
 MuJoCo takes speed as constant over a step and solves the bristles' equation exactly (actuator `dcmotor`, attribute
-`lugre`). Its runs are of the stick-slip of the LuGre paper, with several time steps.
+`lugre`), so a run errs in proportion to the step. Runs are of the stick-slip of the LuGre paper, with several time
+steps.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from benchmarks.oracles.oracle import Finding, NotInstalled, Oracle, number
 EXAMPLE = Path(__file__).parents[2] / "examples" / "lugre_stick_slip.toml"
 
 SPRING, PULL = 2.0, 0.1
-"""Spring [N/m] whose far end moves steadily [m/s]."""
+"""Stiffness of the spring [N/m], and speed of its far end [m/s]."""
 
 SPEED, END = 0.05, 14.5
-"""Speed whose passages upward are timed [m/s], and duration [s]: two slips."""
+"""Speed [m/s] whose upward passages are timed, and duration [s] of two slips."""
 
 STEPS = 4e-4, 2e-4, 1e-4, 5e-5
 """Time steps [s]."""
@@ -35,16 +36,16 @@ MODEL = """<mujoco><option timestep="{step!r}" gravity="0 0 0" integrator="Euler
 
 
 def crossings(times: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Times at which the speed passes `SPEED` upward [s], between samples by straight lines."""
+    """Return the times [s] at which the speed passes `SPEED` upward, interpolated between samples."""
     at = np.flatnonzero((speed[:-1] < SPEED) & (speed[1:] >= SPEED))
     return times[at] + (SPEED - speed[at]) / (speed[at + 1] - speed[at]) * np.diff(times)[at]
 
 
 @cache
 def by_mujoco(step: float) -> tuple[float, float, float]:
-    """First passage [s], time from it to the next [s], and top speed [m/s]."""
+    """Return the first passage [s], the time from it to the next [s], and the top speed [m/s], by MuJoCo."""
     try:
-        mujoco = import_module("mujoco")  # compared with, not built on
+        mujoco = import_module("mujoco")  # only compared with
     except ImportError as missing:
         raise NotInstalled("mujoco is not installed (pip install mujoco)") from missing
     model = mujoco.MjModel.from_xml_string(MODEL.format(step=step))
@@ -61,7 +62,7 @@ def by_mujoco(step: float) -> tuple[float, float, float]:
 
 @cache
 def by_friso() -> tuple[float, float, float]:
-    """First passage [s], time from it to the next [s], and top speed [m/s]."""
+    """Return the first passage [s], the time from it to the next [s], and the top speed [m/s], by friso."""
     response = friso.simulate(friso.load(EXAMPLE), 1e-9, 1e-4)
     time, speed = response["time"].to_numpy(), response["velocity"].to_numpy()
     first, second = crossings(time[time < END], speed[time < END])

@@ -1,4 +1,7 @@
-"""Drift under a load that oscillates below break-away: LuGre's bristles creep, elasto-plastic ones do not."""
+"""Compare drift under a load that oscillates below break-away.
+
+LuGre's bristles creep; elasto-plastic ones do not.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,13 @@ from friso.stage import Stage
 
 MASS, STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 1.7, 3.0, 1.0, 1.6e-3, 1e5, np.sqrt(1e5), 0.5
 BREAKAWAY = 7e-6
-"""Deflection up to which elasto-plastic bristles are elastic [m]: they hold 0.7 N there."""
+"""Deflection [m] up to which elasto-plastic bristles are elastic; they then hold 0.7 N."""
 
 LOAD, SWAY, FREQUENCY = 0.4, 0.25, 20.0
-"""A steady load [N] and one that oscillates [N, Hz]: at most 0.65 N together."""
+"""A steady load [N] and an oscillating one [N, Hz]; together at most 0.65 N."""
 
 SPRING = 1e-3
-"""A spring so soft [N/m] that it holds nothing, as a stage has some controller."""
+"""Stiffness [N/m] of a spring so soft that it holds nothing, because a stage needs some controller."""
 
 FROM, TO = 20, 220
 """Periods of the load between which drift is measured."""
@@ -28,7 +31,7 @@ SCALES = np.array([1e-5, 1e-3, 1e-5])
 
 
 def stage(law: str) -> Stage:
-    """The mass under the load, its dither being the one that oscillates."""
+    """Return the mass under the load as a stage; its dither is the oscillating load."""
     friction = {
         "model": law,
         "static": f"{STATIC} N",
@@ -57,16 +60,19 @@ def stage(law: str) -> Stage:
 
 
 def by_friso(law: str) -> float:
-    """How far the mass drifts between two periods of the load [m]."""
+    """Return how far the mass drifts between two periods of the load [m], by friso."""
     position = friso.simulate(stage(law), 1e-9, 1 / FREQUENCY)["position"].to_numpy()
     return float(position[TO] - position[FROM])
 
 
 def by_scipy(law: str) -> float:
-    """How far the mass drifts between two periods of the load [m], by SciPy's Radau on equations written here."""
+    """Return how far the mass drifts between two periods of the load [m].
+
+    SciPy's Radau runs equations written here.
+    """
 
     def share(z: float, v: float, level: float) -> float:
-        """How much of the bristles slips: all of LuGre's always do."""
+        """Return the fraction of the bristles that slips; LuGre's always slip."""
         if law == "lugre":
             return 1.0
         most, place = level / SIGMA_0, z * np.sign(v)

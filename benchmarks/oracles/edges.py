@@ -1,7 +1,8 @@
-"""Edges of hunting by brute force: at many bandwidths a stage is started from many places and followed for long.
+"""Find edges of hunting by brute force.
 
-Stages are drawn as `benchmarks.truth` draws them, from a seed of their own, and what became of them stands in
-`edges.jsonl`, a line for a stage. Friso has no part in that file; `independent.py` asks friso about its stages.
+At many bandwidths a stage is started from many places and followed for long. Stages are drawn as in `benchmarks.truth`,
+from a separate seed; results are in `edges.jsonl`, a line for each stage. Friso has no part in that file;
+`independent.py` asks friso about its stages.
 """
 
 from __future__ import annotations
@@ -34,52 +35,55 @@ QUOTAS: tuple[Quota, ...] = (
     ("machines", (1, 6), 12),
     ("drives", (0,), 12),
 )
-"""Series of `benchmarks.truth.draws`, the forms in it that are taken, and how many stages with an
-edge: rigid, free and locked ones
-with several laws; dead bands of the error; backlash; frictions at the motor and at the load."""
+"""Classes of stages: series of `benchmarks.truth.draws`, the forms taken from it, and the wanted number of stages with
+an edge. The classes are rigid, free and locked stages with several laws; dead bands of the error; backlash; and
+frictions at motor and load."""
 
 FACTORS = (0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0)
-"""Bandwidths that are tried, in units of the stage's own: friso's range."""
+"""Bandwidths tried, relative to the stage's own: friso's range."""
 
 BRACKET, WIDEST = 1.015, 1.06
-"""Ratio of the two bandwidths between which an edge is left, and the largest at which that still is an edge, where what
-lies between was not decided."""
+"""Ratio of the two bandwidths that finally bracket an edge, and largest ratio that still counts as an edge if
+bandwidths in between were not decided."""
 
 DISTANCES = np.geomspace(0.03, 60.0, 12)
-"""Distances of releases, and of stages that stick, in units of the deflection of the loop at break-away."""
+"""Distances of releases, and of stuck stages, in deflections of the loop at break-away."""
 
 ABOUT = (1.0, 0.97, 1.03, 0.93, 1.07)
-"""Shares of the amplitude at a neighbouring bandwidth at which the stage is also started."""
+"""Fractions of the amplitude at a neighbouring bandwidth at which the stage is also started."""
 
 ROUNDS, PATIENT = (40.0, 250.0, 1500.0), 4
-"""Periods for which runs are followed that did not decide before, and how many of them in the last round."""
+"""Periods for which undecided runs are followed, round by round, and most runs of the last round."""
 
 ROUGH, FINE = 1e-6, 1e-7
-"""Relative tolerances: of all runs, and of those that confirm a swing."""
+"""Relative tolerances: of all runs, and of runs that confirm a swing."""
 
 BUDGET = 1_500_000
-"""Steps that may be spent on a stage at one bandwidth."""
+"""Most steps for a stage at one bandwidth."""
 
 SMALL = 2e-3
-"""Share of the deflection at break-away below which a swing counts as rest."""
+"""Swing, over the deflection at break-away, below which a stage counts as at rest."""
 
 CONFIRMED = (0.99, 1.01)
-"""Factors of the state on a swing from which, at the finer tolerance, the swing has to be taken up again."""
+"""Factors on the state of a swing from which, at the finer tolerance, the swing must be resumed."""
 
 LONG, KEPT = 8, 0.9
-"""Rounds of the first length for which a swing at an edge is confirmed, and the share of its spread that it keeps."""
+"""Number of rounds, each as long as the first one, for confirming a swing at an edge, and the fraction of its spread
+that must remain."""
 
 Record = dict[str, Any]
 
 
 def kept() -> list[Record]:
-    """The stages in the file."""
+    """Return the stages in the file."""
     return [json.loads(line) for line in FILE.read_text().splitlines()] if FILE.exists() else []
 
 
 def grow(seconds: float) -> None:
-    """Add stages to the file, for so long [s] or until every class has its stages with an edge; those without one stay
-    in the file. A stage that is there is not done again."""
+    """Add stages to the file, for some seconds [s] or until every class has enough stages with an edge.
+
+    Stages without an edge stay in the file. A stage in the file is not done again.
+    """
     begun, records = time.monotonic(), kept()
     there = {(record["series"], record["number"]) for record in records}
     queues = {quota: _written(*quota[:2]) for quota in QUOTAS}
@@ -97,18 +101,18 @@ def grow(seconds: float) -> None:
 
 
 def of_quota(quota: Quota, records: Iterable[Record]) -> list[Record]:
-    """The stages of a class."""
+    """Return the stages of a class."""
     series, forms, _ = quota
     return [r for r in records if r["series"] == series and r["number"] % len(SERIES[series]) in forms]
 
 
 def edges_of(quota: Quota, records: Iterable[Record]) -> int:
-    """How many stages of a class have an edge."""
+    """Return how many stages of a class have an edge."""
     return sum(record["edge"] is not None for record in of_quota(quota, records))
 
 
 def _written(series: str, forms: tuple[int, ...]) -> Iterator[tuple[str, int]]:
-    """Series and numbers of stages whose equations are written by hand and whose integral acts."""
+    """Yield series and number of stages with integral action whose equations are written by hand."""
     for number in count():
         if number % len(SERIES[series]) not in forms:
             continue
@@ -118,7 +122,7 @@ def _written(series: str, forms: tuple[int, ...]) -> Iterator[tuple[str, int]]:
 
 
 def by_brute_force(series: str, number: int) -> Record:
-    """What becomes of a stage at many bandwidths, and between which two hunting ends."""
+    """Return what becomes of a stage at many bandwidths, and between which two hunting ends."""
     start, flat = time.process_time(), draw(SEED, number, series).flat()
     words = _words(Plain.of(flat))
     edge = edge_of(words)
@@ -158,8 +162,11 @@ def _words(plain: Plain) -> dict[float, str]:
 
 
 def edge_of(words: Mapping[float, str]) -> list[float] | None:
-    """The bandwidths between which hunting ends as it goes up: the last such pair above the stage's own bandwidth if
-    the stage swings there, or else the nearest below. Between both nothing is decided. None without one."""
+    """Return the two bandwidths between which hunting ends as bandwidth rises, or None.
+
+    It is the last such pair above the stage's own bandwidth if the stage swings there, or else the nearest pair below.
+    Nothing is decided between the two.
+    """
     decided = [factor for factor in sorted(words) if words[factor] != UNSURE]
     pairs = [[low, high] for low, high in pairwise(decided) if (words[low], words[high]) == (SWINGS, RESTS)]
     above = words[1.0] == SWINGS
@@ -168,9 +175,11 @@ def edge_of(words: Mapping[float, str]) -> list[float] | None:
 
 
 def what_becomes(plain: Plain, amplitude: float = 0.0, lasting: bool = False) -> tuple[str, float]:
-    """Whether a stage swings on from any start, and how far [m]; it is also started about an `amplitude` [m]. Near an
-    edge swings may die out after hundreds of periods: `lasting` follows them longer. What takes more than `BUDGET`
-    steps is not decided."""
+    """Return whether a stage keeps swinging from any start, and how far [m].
+
+    It is also started around an `amplitude` [m]. Near an edge swings may die out after hundreds of periods: `lasting`
+    follows them longer. Work beyond `BUDGET` steps leaves it undecided.
+    """
     starts, steps = [*_starts(plain, amplitude)], 0
     for periods, most in ((ROUNDS[0], len(starts)), (ROUNDS[1], len(starts)), (ROUNDS[2], PATIENT)):
         going = []
@@ -198,7 +207,7 @@ def _starts(plain: Plain, amplitude: float) -> Iterator[np.ndarray]:
 
 
 def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last: bool) -> tuple[str, Run]:
-    """What becomes of a run, and the run."""
+    """Return what becomes of a run, and the run."""
     end = periods * plain.period
     run = plain.run(start, end, rtol)
     small = SMALL * plain.length
@@ -206,7 +215,10 @@ def _followed(plain: Plain, start: np.ndarray, periods: float, rtol: float, last
 
 
 def _confirmed(plain: Plain, state: np.ndarray, rounds: int) -> bool:
-    """Whether neighbours of a state on a swing take that up for as many rounds, and keep up `KEPT` of it."""
+    """Tell whether neighbours of a state on a swing resume that swing.
+
+    They must keep `KEPT` of its spread for the given number of rounds.
+    """
     for factor in CONFIRMED:
         spreads, near = list[float](), factor * state
         for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""Friso's verdicts and edges beside those of brute force (`edges.py`), class by class."""
+"""Compare friso's verdicts and edges with those of brute force (`edges.py`), class by class."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from friso.equations.structure import structure
 from friso.hunting import Swinging, find_swings, needed_kernels
 
 ANSWERS = Path("benchmark_results/oracles.jsonl")
-"""Friso's answers, a line each, with a digest of the code that gave them: what is there is not asked again."""
+"""Friso's answers, a line each, with a digest of the code that gave them. Stages in the file are not asked again."""
 
 CLASSES = ("one friction", "dead band of the error", "backlash", "friction at the motor and at the load")
 """Names of the classes of `edges.QUOTAS`."""
@@ -33,8 +33,8 @@ CLASSES = ("one friction", "dead band of the error", "backlash", "friction at th
 VERDICT, MISSED = "verdict", "edge; plain runs begun on friso's orbit swing on up to friso's"
 
 JUST_BELOW, LASTING, SAME_SWING = 0.9975, 5, 0.01
-"""Share of friso's edge at which plain runs are begun on its own motion, rounds for which they are followed, and the
-share by which their amplitude may differ."""
+"""Fraction of friso's edge at which plain runs start on its own motion, rounds for which they are followed, and the
+largest relative difference of their amplitude."""
 
 PLACES = {
     **{"position": X, "velocity": V, "cart_position": XC, "cart_velocity": VC, "motor_position": XP},
@@ -42,14 +42,14 @@ PLACES = {
     **{"filtered_error": LOW, "filtered_position": LOW, "integral": INTEGRAL},
     **{"motor_bristle_deflection": BRISTLE},
 }
-"""Places in plain runs of friso's states."""
+"""Indices in plain runs of friso's states."""
 
 SLACK = 1e-3
-"""Share by which an edge may lie outside the bandwidths between which brute force has it: what runs at 1e-6 leave."""
+"""Relative distance by which an edge may lie outside brute force's bracket: the error of runs at 1e-6."""
 
 
 def answer(record: Record) -> Record:
-    """What friso says of a stage."""
+    """Return what friso says about a stage."""
     key = {"series": record["series"], "seed": record["seed"], "number": record["number"], "code": code_digest(CHECKED)}
     lines = ANSWERS.read_text().splitlines() if ANSWERS.exists() else []
     for said in map(json.loads, lines):
@@ -80,15 +80,21 @@ def edges() -> Iterator[Finding]:
 
 
 def compared(quota: Quota, records: Sequence[Record]) -> list[Record]:
-    """The stages of a class that have an edge, and as many that have none and are decided at their own bandwidth."""
+    """Return the stages of a class that have an edge, and as many without one.
+
+    The latter are decided at their own bandwidth.
+    """
     own = [record for record in of_quota(quota, records) if record["words"]["1"] in (SWINGS, RESTS)]
     with_edge = [record for record in own if record["edge"]]
     return with_edge + [record for record in own if not record["edge"]][: len(with_edge)]
 
 
 def missed(record: Record, said: Record) -> bool:
-    """Whether brute force missed a swing: its edge lies below friso's, no run swings on above that, and plain runs
-    begun on friso's own motion just below it swing on. Basins near an edge are narrow."""
+    """Tell whether brute force missed a swing, because basins near an edge are narrow.
+
+    It did if its edge lies below friso's, no run swings above friso's edge, and plain runs started on friso's own
+    motion just below it keep swinging.
+    """
     end = said["edge"]
     if not end or not record["edge"] or record["edge"][1] > end["factor"] or beyond(record, said):
         return False
@@ -115,7 +121,7 @@ def _lasts(plain: Plain, names: Sequence[str], motion: Swinging) -> bool:
 
 
 def by_class(name: str, pairs: Sequence[tuple[Record, Record]]) -> Iterator[Finding]:
-    """Counts of what friso is certain about, and of what of that brute force has, too."""
+    """Yield counts of what friso is certain about, and how much of it brute force confirms."""
     sure = [(record, said) for record, said in pairs if said["certain"]]
     open_edges = sum(not _sure_edge(said) for record, said in pairs if record["edge"])
     parts = {
@@ -133,7 +139,7 @@ def by_class(name: str, pairs: Sequence[tuple[Record, Record]]) -> Iterator[Find
 
 
 def differences(record: Record, said: Record) -> Iterator[tuple[str, tuple[str, str]]]:
-    """In what both differ, whether friso is certain or not: what was asked, and both answers."""
+    """Yield the differences, whether friso is certain or not: what was asked, and both answers."""
     if not same_verdict(record, said):
         yield VERDICT, (said["verdict"], record["words"]["1"])
     if record["edge"] and not same_edge(record, said):
@@ -147,19 +153,19 @@ def differences(record: Record, said: Record) -> Iterator[tuple[str, tuple[str, 
 
 
 def same_verdict(record: Record, said: Record) -> bool:
-    """Whether friso says that something attracts if and only if a run swings on."""
+    """Tell whether friso states an attractor if and only if a run keeps swinging."""
     return (said["verdict"] in ATTRACTED) == (record["words"]["1"] == SWINGS)
 
 
 def same_edge(record: Record, said: Record) -> bool:
-    """Whether an end that friso tells overlaps the bandwidths between which brute force has the edge."""
+    """Tell whether an end that friso states overlaps brute force's bracket of the edge."""
     low, high = record["edge"]
     ends = [said["edge"], *(end for _, end in said["windows"])]
     return any(end["factor"] <= high * (1 + SLACK) and end["quiet"] >= low * (1 - SLACK) for end in ends if end)
 
 
 def beyond(record: Record, said: Record) -> list[float]:
-    """Bandwidths at which runs swing on although friso has nothing attract there, beyond its edge."""
+    """Return bandwidths beyond friso's edge at which runs keep swinging although friso has no attractor."""
     if not said["edge"]:
         return []
     factors = [float(factor) for factor, word in record["words"].items() if word == SWINGS]

@@ -1,4 +1,4 @@
-"""What an oracle is: a fact with its source, and answers of friso beside those of somebody else."""
+"""Define an oracle: a fact with its source, and friso's answers beside those of others."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 
 class NotInstalled(Exception):
-    """An oracle needs a package that friso does not."""
+    """Error: an oracle needs a package that friso does not."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that friso and an oracle both answer: what was asked, both answers in words, and whether they agree.
+    """An answer of friso beside that of an oracle: the question, both answers in words, whether they agree.
 
-    None stands for neither: friso leaves it open, or the oracle does.
+    None stands for neither: friso or the oracle leaves it open.
     """
 
     what: str
@@ -25,8 +25,11 @@ class Finding:
 
 @dataclass(frozen=True)
 class Oracle:
-    """A fact that nobody here made: its name, the fact in a sentence, its source, in which sense friso has to agree and
-    why (stated before both were compared), and the function that asks friso and the oracle."""
+    """A fact that others have established.
+
+    It has a name, the fact in a sentence, its source, the sense in which friso has to agree and why (stated before the
+    comparison), and the function that asks friso and the oracle.
+    """
 
     name: str
     fact: str
@@ -38,7 +41,7 @@ class Oracle:
 def number(
     what: str, friso: float, oracle: float, rtol: float = 0.0, atol: float = 0.0, unit: str = "", digits: int = 6
 ) -> Finding:
-    """Two numbers that agree within a share of the oracle's, or within a distance from it."""
+    """Compare two numbers, which may differ by a fraction of the oracle's, or by a distance."""
     agrees = bool(abs(friso - oracle) <= max(rtol * abs(oracle), atol))
     one, other = (f"{value:.{digits}g} {unit}".strip() for value in (friso, oracle))
     return Finding(what, one, other, agrees)

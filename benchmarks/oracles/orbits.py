@@ -1,8 +1,9 @@
-"""Closed orbits of one rigid mass by SciPy alone: shooting, multipliers by finite differences, and bifurcations.
+"""Compute closed orbits of one rigid mass by SciPy alone.
 
-The mass rides on a LuGre bearing (doi:10.1109/9.376053) under van Dijk's PID, its reference held at 0. An orbit begins
-where the mass passes its reference, which it does once a swing and fast. A symmetric one ends half a period later in
-the mirror image of its beginning. Runs are SciPy's LSODA at 1e-13; nothing of friso is used.
+It uses shooting, multipliers by finite differences, and bifurcations. The mass rides on a LuGre bearing
+(doi:10.1109/9.376053) under van Dijk's PID, its reference held at 0. An orbit begins where the mass passes its
+reference, which it does once a swing and fast. A symmetric one ends half a period later in the mirror image of its
+beginning. Runs are SciPy's LSODA at 1e-13; nothing of friso is used.
 """
 
 from __future__ import annotations
@@ -23,29 +24,29 @@ SCALES = np.array([1e-3, 1e-2, 1e-5, 1e-3, 1e-4])
 RTOL = 1e-13
 
 DIFFERENCE = 2e-6
-"""Share of a state's magnitude by which it is moved for a central difference."""
+"""Step of a central difference, relative to a state's magnitude."""
 
 CLOSED = 1e-8
-"""Gap of a closed orbit, in units of the magnitudes."""
+"""Largest gap of a closed orbit, relative to the magnitudes."""
 
 MOST_TRIES, MOST_CHANGE = 12, 3.0
-"""Steps of Newton's method, and by how much one may change any unknown."""
+"""Most steps of Newton's method, and largest change of an unknown in one step."""
 
 APART, FARTHEST, TELLING = 1e-7, 1e-3, 0.003
-"""Shares by which the first two speeds at the passage differ at least and at most, which is also the longest step; and
-the difference of multipliers that tells where to go: some families change by 1e-8 of the crossover while their speed
-changes by a hundredth."""
+"""Least and largest relative difference of the first two speeds at the passage, the latter also the longest step; and
+the difference of multipliers that decides the direction. Some families change by 1e-8 of the crossover while their
+speed changes by a hundredth."""
 
 SECANTS, REACHED = 40, 1e-7
-"""Steps by secants, and the share by which the last changes the crossover."""
+"""Most secant steps, and relative change of the crossover at which they end."""
 
 RELEASE, SETTLING = 2e-3, 60.0
-"""Distance [m] from which the mass is let go for a first orbit, and the time [s] after which that is taken."""
+"""Distance [m] from which the mass is released for a first orbit, and the time [s] after which its motion is taken."""
 
 
 @njit(cache=True)
 def rates(y: np.ndarray, crossover: float) -> np.ndarray:
-    """Derivative of place, speed, bristles, filtered error and its integral."""
+    """Return the derivatives of place, speed, bristles, filtered error and its integral."""
     omega = 2 * np.pi * crossover
     gain = MASS * omega**2 * np.sqrt(ALPHA)
     tau_z, tau_p = 1 / (omega * np.sqrt(ALPHA)), np.sqrt(ALPHA) / omega
@@ -60,7 +61,7 @@ def rates(y: np.ndarray, crossover: float) -> np.ndarray:
 
 
 def flow(y: np.ndarray, time: float, crossover: float) -> np.ndarray:
-    """The state after a time [s]."""
+    """Return the state after a time [s]."""
     ends, report = odeint(
         lambda t, x: rates(x, crossover),
         y,
@@ -78,8 +79,11 @@ def flow(y: np.ndarray, time: float, crossover: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A closed orbit: crossover [Hz], state where it passes the reference, time [s], and -1 if it ends in the mirror
-    image of its beginning, else 1."""
+    """A closed orbit.
+
+    It has a crossover [Hz], the state where it passes the reference, a time [s], and a sign: -1 if it ends in the
+    mirror image of its beginning, else 1.
+    """
 
     crossover: float
     start: np.ndarray
@@ -91,20 +95,26 @@ class Orbit:
         return self.time * (2 if self.sign < 0 else 1)
 
     def returned(self) -> np.ndarray:
-        """The state at the end, taken back to the beginning; on an orbit the same as `start`."""
+        """Return the state at the end, mirrored back; on an orbit it equals `start`."""
         return self.sign * flow(self.start, self.time, self.crossover)
 
     def gap(self) -> np.ndarray:
         return (self.returned() - self.start) / SCALES
 
     def moved(self, shift: np.ndarray) -> Orbit:
-        """With speed, bristles, filtered error, integral, time and crossover changed by shares of their magnitudes."""
+        """Return the orbit with its unknowns changed by fractions of their magnitudes.
+
+        They are speed, bristles, filtered error, integral, time and crossover.
+        """
         start = self.start + SCALES * np.append(0.0, shift[:4])
         return Orbit(self.crossover * (1 + shift[5]), start, self.time * (1 + shift[4]), self.sign)
 
     def map_derivative(self) -> np.ndarray:
-        """Derivative of the Poincare map over speed, bristles, filtered error and integral, (4, 4), in units of their
-        magnitudes: differences of the flow, less what the time of the next passage takes away."""
+        """Return the derivative of the Poincare map, (4, 4), relative to the magnitudes.
+
+        It is by speed, bristles, filtered error and integral: differences of the flow, corrected for the time of the
+        next passage.
+        """
         columns = np.array([self._slope(k) for k in range(4)]).T
         speed = self.sign * rates(self.returned() * self.sign, self.crossover) / SCALES
         return (columns - np.outer(speed, columns[0] / speed[0]))[1:]
@@ -117,17 +127,17 @@ class Orbit:
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Of the map from one passage to the next on this orbit, the largest first."""
+        """Return the multipliers of the map from one passage to the next on this orbit, the largest first."""
         values = np.linalg.eigvals(self.map_derivative())
         return values[np.argsort(-np.abs(values))]
 
     @property
     def multiplier(self) -> float:
-        """The largest one, which is real here."""
+        """Return the largest multiplier, which is real here."""
         return float(self.multipliers[0].real)
 
     def amplitude(self) -> float:
-        """Half of peak to peak over the orbit [m]."""
+        """Return half of peak to peak over the orbit [m]."""
         run = solve_ivp(
             lambda t, y: rates(y, self.crossover),
             (0.0, self.period),
@@ -141,8 +151,11 @@ class Orbit:
 
 
 def closed(guess: Orbit, free: int = 5) -> Orbit:
-    """The orbit next to a guess by Newton's method; the unknown with the number `free` is held (5: the crossover, 0:
-    the speed at the passage). Raises RuntimeError where there is none."""
+    """Return the orbit next to a guess by Newton's method.
+
+    The unknown with the number `free` is held (5: the crossover, 0: the speed at the passage). Raises RuntimeError if
+    there is none.
+    """
     unknown = [k for k in range(6) if k != free]
     for _ in range(MOST_TRIES):
         gap = guess.gap()
@@ -162,7 +175,7 @@ def closed(guess: Orbit, free: int = 5) -> Orbit:
 
 
 def first_orbit(crossover: float) -> Orbit:
-    """The symmetric orbit in which a release ends."""
+    """Return the symmetric orbit in which a release ends."""
     upward = lambda t, y: y[0]  # noqa: E731
     upward.direction = 1.0  # pyright: ignore[reportFunctionMemberAccess]
     released = np.array([RELEASE, 0.0, 0.0, 0.0, 0.0])
@@ -182,7 +195,10 @@ def first_orbit(crossover: float) -> Orbit:
 
 
 def passing(crossover: float, state: np.ndarray, time: float, sign: float) -> Orbit:
-    """The orbit near a state, from where that next passes the reference upward; `time` [s] is what a return takes."""
+    """Return the orbit near a state, from where it next passes the reference upward.
+
+    `time` [s] is the time of a return.
+    """
     upward = lambda t, y: y[0]  # noqa: E731
     upward.direction, upward.terminal = 1.0, True  # pyright: ignore[reportFunctionMemberAccess]
     run = solve_ivp(
@@ -194,8 +210,10 @@ def passing(crossover: float, state: np.ndarray, time: float, sign: float) -> Or
 
 
 def located(guess: Orbit, multiplier: float) -> Orbit:
-    """The orbit near a guess whose multiplier has a value, 1 at a fold and -1 at a flip: over the speed at the passage,
-    which goes on round a fold, by secants."""
+    """Return the orbit near a guess whose multiplier has a given value, 1 at a fold and -1 at a flip.
+
+    Secants vary the speed at the passage, which continues around a fold.
+    """
 
     def at(speed: float, near: Orbit) -> tuple[float, Orbit]:
         orbit = closed(replace(near, start=np.append([0.0, speed], near.start[2:])), free=0)

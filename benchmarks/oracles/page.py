@@ -1,4 +1,4 @@
-"""The page of oracles: a table of all, and a section for each one that says what agrees and what does not."""
+"""Write the page of oracles: a table of all, and a section for each on what agrees and what does not."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WORDS = {True: "yes", False: "**no**", None: "-"}
 
 
 def page(written: Mapping[str, str]) -> str:
-    """The page of sections, by the names of their oracles."""
+    """Return the page from its sections, by the names of their oracles."""
     rows = [[f"[{name}](#{name})", *_summary(text)] for name, text in written.items()]
     lines = [
         "# Oracles",
@@ -35,7 +35,7 @@ def page(written: Mapping[str, str]) -> str:
 
 
 def section(oracle: Oracle, findings: Sequence[Finding]) -> str:
-    """What is written of an oracle."""
+    """Return the section of an oracle."""
     counted = [finding.agrees for finding in findings if finding.agrees is not None]
     rows = [[finding.what, finding.friso, finding.oracle, WORDS[finding.agrees]] for finding in findings]
     lines = [
@@ -51,13 +51,13 @@ def section(oracle: Oracle, findings: Sequence[Finding]) -> str:
 
 
 def sections(file: Path) -> dict[str, str]:
-    """The sections of a page that was written before, by the names of their oracles."""
+    """Return the sections of an existing page, by the names of their oracles."""
     parts = file.read_text().split(HEADING)[1:] if file.exists() else []
     return dict(part.split("\n\n", 1) for part in parts)
 
 
 def _summary(text: str) -> list[str]:
-    """Of a section: how much agrees, the day, and the code."""
+    """Return a summary of a section: how much agrees, the day, and the code."""
     stated = re.search(r"- Agrees: (\d+) of (\d+); (\S+), code (`\w+`)", text)
     assert stated
     share, whole, day, code = stated.groups()

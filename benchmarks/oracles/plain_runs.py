@@ -1,9 +1,9 @@
-"""Plain simulation of a stage, in equations written by hand and with an integrator of its own.
+"""Simulate a stage plainly, with equations written by hand and a separate integrator.
 
-The equations are those of `benchmarks.truth.by_hand`, to which a second friction, at the motor, is added here. The
-integrator is the Rosenbrock method of Kaps and Rentrop with Shampine's coefficients, order 4 with an error of order 3
-(L. F. Shampine, Implementation of Rosenbrock methods, ACM Trans. Math. Software 8, 1982, doi:10.1145/355993.355994).
-There are no events: the control of the error steps over every kink. Nothing of friso's equations or engine is used.
+The equations are those of `benchmarks.truth.by_hand`, with a second friction, at the motor, added here. The integrator
+is the Rosenbrock method of Kaps and Rentrop with Shampine's coefficients, order 4 with an error of order 3 (L. F.
+Shampine, Implementation of Rosenbrock methods, ACM Trans. Math. Software 8, 1982, doi:10.1145/355993.355994). There are
+no events: the control of the error steps over every kink. Nothing of friso's equations or engine is used.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from benchmarks.truth.by_hand import (
 )
 
 BRISTLE = len(STATES)
-"""Place of the motor's bristles, behind the states of `by_hand`."""
+"""Index of the motor's bristles, after the states of `by_hand`."""
 
 SIZE = BRISTLE + 1
 
@@ -46,25 +46,28 @@ SECOND = (
     *("static", "coulomb", "stribeck_velocity", "stribeck_exponent", "bristle_stiffness", "bristle_damping"),
     *("viscous", "regularisation_velocity"),
 )
-"""Keys of the friction at the motor, in the order in which `_all_rates` reads them behind its law."""
+"""Keys of the friction at the motor, in the order in which `_all_rates` reads them after its law."""
 
 SPEED = {"kp": 2, "ki": 3, "kd": 1, "tau": -1}
-"""Powers of the factor by which the gains of a PID change that is faster as a whole."""
+"""Powers of the factor by which the gains of a PID change when it becomes faster as a whole."""
 
 MOST_TURNS = 20_000
-"""Turning points that a run keeps; they are counted on."""
+"""Most turning points stored for a run; further ones are only counted."""
 
 MOST_STEPS = 500_000
-"""Steps after which a run is given up."""
+"""Steps after which a run is abandoned."""
 
 AWAY = 1e6
-"""Deflections at break-away beyond which a run is given up: the loop is unstable."""
+"""Distance, in deflections at break-away, beyond which a run is abandoned because the loop is unstable."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Times [s] and places [m] of the turning points of a run, its last state, how far the place spreads in the last
-    quarter [m], the steps, and whether it was completed: with neither too many steps nor leaving for good."""
+    """Result of a run.
+
+    It has times [s] and places [m] of the turning points, the last state, the spread of the place in the last quarter
+    [m], and the steps. It was completed if it took few enough steps and did not diverge.
+    """
 
     times: np.ndarray
     places: np.ndarray
@@ -76,14 +79,14 @@ class Run:
 
 @dataclass(frozen=True)
 class Plain:
-    """One stage with its reference held at 0: its equations by hand, and the friction at its motor (all 0: none)."""
+    """A stage with its reference held at 0: equations by hand, and friction at the motor (all 0: none)."""
 
     equations: ByHand
     second: np.ndarray
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Plain:
-        """The stage given as flat keys to SI numbers. Raises NotWritten."""
+        """Return the stage given as flat keys to SI numbers. Raises NotWritten."""
         second = np.zeros(1 + len(SECOND))
         model = flat.get(f"{MOTOR}model", "none")
         if model not in LAWS:
@@ -98,7 +101,7 @@ class Plain:
         return cls(by_hand(rest).held(), second)
 
     def faster(self, factor: float) -> Plain:
-        """The stage under a PID that is faster as a whole by a factor."""
+        """Return the stage with its PID faster as a whole by a factor."""
         numbers = self.equations.numbers.copy()
         if numbers[NAMES.index("observer")]:
             raise NotWritten("the bandwidth of an observer")
@@ -111,23 +114,26 @@ class Plain:
 
     @property
     def length(self) -> float:
-        """Deflection of the loop by the forces at which both frictions break away [m]."""
+        """Return the deflection [m] of the loop by the forces at which both frictions break away."""
         return self.equations.length + float(self.second[1] if self.second[0] else 0.0) / self._number("kp")
 
     @property
     def period(self) -> float:
-        """About the time between two departures to the same side [s]: two waits at a third of `length`, two swings."""
+        """Return roughly the time [s] between two departures to the same side.
+
+        It is two waits at a third of `length`, and two swings.
+        """
         return 2 * (3 * self._number("kp") / self._number("ki") + 2 * np.pi / self.equations.omega)
 
     @property
     def scales(self) -> np.ndarray:
-        """Magnitudes of the states."""
+        """Return the magnitudes of the states."""
         second = self.second[1] / self.second[5] if self.second[0] and self.second[5] else 1.0
         return np.append(self.equations.scales, second)
 
     @property
     def live(self) -> np.ndarray:
-        """Places of the states that ever move."""
+        """Return the indices of the states that ever move."""
         joint, motor, part = (self._number(name) > 0 for name in ("joint", "motor", "part"))
         bristles = self._number("law") in (LAWS.index("lugre"), LAWS.index("dahl"))
         second = self.second[0] in (LAWS.index("lugre"), LAWS.index("dahl"))
@@ -138,11 +144,11 @@ class Plain:
         return np.array([place for place, live in sorted(moves.items()) if live])
 
     def released(self, displacement: float) -> np.ndarray:
-        """All at rest at a displacement [m], nothing wound up."""
+        """Return a start at rest at a displacement [m], with nothing wound up."""
         return np.append(self.equations.start(displacement), 0.0)
 
     def stuck(self, displacement: float) -> np.ndarray:
-        """All at rest at a displacement [m], where the integral just balances the proportional force."""
+        """Return a start at rest at a displacement [m], with the integral balancing the proportional force."""
         y = self.released(displacement)
         if self._number("tuned") or (self._number("tau") and self._number("on_error")):
             y[LOW] = -displacement
@@ -150,7 +156,7 @@ class Plain:
         return y
 
     def run(self, y: np.ndarray, end: float, rtol: float) -> Run:
-        """From a state to the time `end` [s]."""
+        """Run from a state to the time `end` [s]."""
         measured, far = self.equations.measured, AWAY * self.length
         arrays = self.equations.numbers, self.second, self.scales, self.live
         run = _followed(y.astype(float), end, rtol, measured, far, *arrays)
@@ -160,7 +166,10 @@ class Plain:
 
 @njit(cache=True)
 def _all_rates(y, n, second):  # type: ignore[no-untyped-def]
-    """dy/dt, the reference held at 0. The friction at the motor acts on its velocity."""
+    """Return dy/dt, with the reference held at 0.
+
+    The friction at the motor acts on its velocity.
+    """
     out = np.zeros(SIZE)
     out[:BRISTLE] = _rate(0.0, y[:BRISTLE], np.zeros(4), n)
     law = second[0]
@@ -182,7 +191,10 @@ def _all_rates(y, n, second):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _slopes(y, base, n, second, scales, live):  # type: ignore[no-untyped-def]
-    """The Jacobian of the states that move, by differences, velocities to the side on which they are."""
+    """Return the Jacobian of the moving states by differences.
+
+    Velocities are changed to the side on which they are.
+    """
     out = np.zeros((len(live), len(live)))
     moved = y.copy()
     for column, k in enumerate(live):
@@ -197,7 +209,7 @@ def _slopes(y, base, n, second, scales, live):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _factored(a):  # type: ignore[no-untyped-def]
-    """LU factors in place, with the order of rows."""
+    """Factor a matrix in place (LU); return the order of rows."""
     size = len(a)
     order = np.arange(size)
     for k in range(size):
@@ -235,7 +247,7 @@ def _solved(lu, order, b):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _step(y, h, base, slopes, n, second, live):  # type: ignore[no-untyped-def]
-    """The state after a step of h, and its estimated error, of the states that move."""
+    """Return the state after a step of h, and its estimated error, for the moving states."""
     lu = np.eye(len(live)) * (2.0 / h) - slopes
     order = _factored(lu)
     moved = y.copy()
@@ -267,7 +279,7 @@ def _followed(y, end, rtol, measured, far, n, second, scales, live):  # type: ig
         size = 0.0
         for row, k in enumerate(live):
             size = max(size, abs(error[row]) / (rtol * max(scales[k], abs(y[k]))))
-        if not size <= 1.0:  # also where it is not a number
+        if not size <= 1.0:  # NaN counts as too large
             h *= max(0.2, 0.9 * size ** (-1 / 3)) if size < np.inf else 0.2
             continue
         before = y[speed]

@@ -1,4 +1,4 @@
-"""The servo of the paper that introduced LuGre: with its integral gain it hunts, without it does not."""
+"""Compare with the servo of the LuGre paper: it hunts with its integral gain, and not without."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 1.5, 1.0, 1e-3, 1e5, np.s
 """Gains and friction of the paper, for a mass of 1 kg, in SI units."""
 
 END = 150.0
-"""Time for which the step of 1 m is followed [s]: six periods."""
+"""Time [s] for which the step of 1 m is followed: six periods."""
 
 SCALES = np.array([1.0, 0.1, 1e-5, 1.0])
 
 
 def stage(ki: float = KI) -> Stage:
-    """The servo as a stage file has it, following a step of 1 m."""
+    """Return the servo as a stage that follows a step of 1 m."""
     return Stage(
         name="LuGre servo",
         masses={"cart": "1 kg"},
@@ -51,7 +51,10 @@ def stage(ki: float = KI) -> Stage:
 
 @cache
 def by_scipy(ki: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Times [s] and places [m] at which the mass turns, and where it ends: SciPy's LSODA on the paper's equations."""
+    """Return times [s] and places [m] of turning points, and the final place.
+
+    SciPy's LSODA runs the paper's equations.
+    """
 
     def rates(t: float, y: np.ndarray) -> tuple[float, ...]:
         x, v, z, integral = y
@@ -68,7 +71,7 @@ def by_scipy(ki: float) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def swings(times: np.ndarray, places: np.ndarray) -> dict[str, float]:
-    """First peak [m] and its time [s], and peak to peak [m] and period [s] at the end."""
+    """Return first peak [m] and its time [s], and final peak-to-peak swing [m] and period [s]."""
     late = places[times > END - 60]
     middle, last = (late.max() + late.min()) / 2, np.flatnonzero(times > END - 60)
     over = places[last] > middle

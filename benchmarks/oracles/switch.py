@@ -1,9 +1,10 @@
-"""A mass under a PID with Coulomb and static friction and no bristles, solved exactly from one stop to the next.
+"""Solve a mass under a PID with Coulomb and static friction exactly, from stop to stop.
 
-While the mass slides to one side, the loop is linear: the sum of forces, m x'' + kd x' + kp x + ki (integral of x),
-stays at minus the Coulomb friction. It breaks away at rest where the motor holds static friction, so that it begins
-with an acceleration of gap over mass, gap being static less Coulomb friction. Where it next stops follows from the
-matrix exponential, and is one map of the distance at which it stuck. Derived here; the statements are from
+There are no bristles. While the mass slides to one side, the loop is linear: the sum of forces, m x'' + kd x' + kp x +
+ki (integral of x), stays at minus the Coulomb friction. It breaks away from rest when the motor force reaches static
+friction, so it begins with an acceleration of gap over mass, the gap being static less Coulomb friction. Where it next
+stops follows from the matrix exponential, and is one map of the distance at which it stuck. Derived here; the
+statements are from
 
 - Armstrong, Amin 1996, PID control in the presence of static friction, Automatica 32(5) 679-692,
   doi:10.1016/0005-1098(95)00199-9: with static above Coulomb friction every stabilising PID has a limit cycle;
@@ -25,30 +26,30 @@ from friso.hunting import Ensemble, Hunting, find_cycles, find_swings, hunting
 from friso.stage import Stage
 
 MASS, COULOMB, GAP = 1.7, 1.0, 2.0
-"""Mass [kg], Coulomb friction and what static friction exceeds it by [N]."""
+"""Mass [kg], Coulomb friction [N], and excess of static friction over it [N]."""
 
 MANY, ASKED, SHOWN = 300, 24, 6
-"""Drawn controllers that are solved exactly, those of them that friso is asked about, and those that are shown on the
-whole way to the limit."""
+"""Number of drawn controllers that are solved exactly, that friso is asked about, and that are shown all the way to the
+limit."""
 
 DISTANCES = np.geomspace(1e-3, 1e4, 71)
-"""Distances at which the mass sticks, in units of the gap over kp."""
+"""Distances at which the mass sticks, relative to the gap over kp."""
 
 SHARPER, SHARP = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5), 1e-3
-"""Steps to the limit of LuGre: Stribeck velocity in units of the fastest that the gap alone drives the mass, while the
-bristles are as many times stiffer than the loop as its inverse squared, and at least a thousand times; and the step at
-which most are asked."""
+"""Steps to the limit of LuGre, and the step at which most controllers are asked. A step is the Stribeck velocity
+relative to the fastest speed that the gap alone causes. The bristles are stiffer than the loop by the inverse square of
+the step, and by at least a thousand."""
 
 LONG = 60.0
-"""Time for which a slide is followed, in units of that of the loop."""
+"""Time for which a slide is followed, in units of the loop's."""
 
 NEAR = 0.01
-"""Share by which the amplitude of friso's cycle may differ from the exact one at the last step to the limit."""
+"""Largest relative difference of the amplitude of friso's cycle from the exact one at the last step to the limit."""
 
 
 @dataclass(frozen=True)
 class Pid:
-    """Gains of a PID [N/m, N/(m s), N s/m], its derivative taken of the position."""
+    """Gains of a PID [N/m, N/(m s), N s/m], with the derivative of the position."""
 
     kp: float
     ki: float
@@ -60,12 +61,12 @@ class Pid:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """The linear loop of place, speed and acceleration while the mass slides to one side."""
+        """Return the linear loop of place, speed and acceleration while the mass slides to one side."""
         return np.array([[0, 1, 0], [0, 0, 1], [-self.ki / MASS, -self.kp / MASS, -self.kd / MASS]])
 
     @cached_property
     def responses(self) -> np.ndarray:
-        """What place, speed and acceleration become at many times, (times, 3, 3)."""
+        """Return the responses of place, speed and acceleration at many times, (times, 3, 3)."""
         step, all_of = expm(self.rows * self.times[1]), [np.eye(3)]
         for _ in self.times[1:]:
             all_of.append(step @ all_of[-1])
@@ -76,8 +77,10 @@ class Pid:
         return np.linspace(0.0, LONG / self.omega, 6001)
 
     def stop(self, distance: float, gap: float) -> np.ndarray:
-        """Place [m], speed and acceleration with which the mass stops that stuck at a distance [m] above its reference
-        and broke away downward, with an acceleration of -gap/mass; NaN if it does not stop but creeps home."""
+        """Return place [m], speed and acceleration at the next stop, NaN if the mass creeps home instead.
+
+        The mass stuck at a distance [m] above its reference and broke away downward, with an acceleration of -gap/mass.
+        """
         start = np.array([distance, 0.0, -gap / MASS])
         speeds = self.responses[:, 1] @ start
         after = np.flatnonzero(speeds[2:] >= 0)
@@ -89,7 +92,10 @@ class Pid:
         return expm(self.rows * end) @ before
 
     def cycle(self) -> tuple[float, bool]:
-        """Half of peak to peak of the limit cycle [m], NaN without one, and whether the mass sticks at its ends."""
+        """Return half of peak to peak of the limit cycle [m], NaN without one.
+
+        Also tell whether the mass sticks at its ends.
+        """
         unit = GAP / self.kp
 
         def growth(distance: float) -> float:
@@ -104,15 +110,20 @@ class Pid:
         return distance, bool(abs(MASS * self.stop(distance, GAP)[2] - COULOMB) <= COULOMB + GAP)
 
     def ratio(self) -> float:
-        """By what factor distance changes from one stop to the next under Coulomb friction alone, whatever the distance
-        (below 0: it stops before its reference); 0 if it does not stop but creeps home."""
+        """Return the ratio of the distances of successive stops under Coulomb friction alone.
+
+        It does not depend on the distance. It is below 0 if the mass stops before its reference, and 0 if it creeps
+        home.
+        """
         place = self.stop(1.0, 0.0)[0]
         return 0.0 if np.isnan(place) else -float(place)
 
 
 def drawn(count: int) -> list[Pid]:
-    """Stabilising PIDs, log-uniform: natural frequency 1 to 20 Hz, damping 0.2 to 2, integral 2 to 90 % of the limit of
-    Hurwitz, kp kd > m ki."""
+    """Draw stabilising PIDs, log-uniform.
+
+    Natural frequencies are 1 to 20 Hz, damping 0.2 to 2, and the integral 2 to 90 % of Hurwitz's limit, kp kd > m ki.
+    """
     rng, pids = np.random.default_rng(1996), list[Pid]()
     for _ in range(count):
         omega, damping, share = np.exp(rng.uniform(np.log([2 * np.pi, 0.2, 0.02]), np.log([40 * np.pi, 2.0, 0.9])))
@@ -122,7 +133,7 @@ def drawn(count: int) -> list[Pid]:
 
 
 def stage(pid: Pid, sharpness: float, gap: float = GAP) -> Stage:
-    """The mass with LuGre friction, so much nearer to the limit the smaller `sharpness` is."""
+    """Return the mass with LuGre friction; a smaller `sharpness` is nearer to the limit."""
     top = gap / (MASS * pid.omega) if gap else 1e-3
     bristles = pid.kp * max(1e3, sharpness**-2)
     friction = {
@@ -172,7 +183,7 @@ def always() -> Iterator[Finding]:
 
 
 def at_the_limit(answers: Sequence[Hunting], sharpness: float) -> Iterator[Finding]:
-    """Stages of which friso is certain that another number of motions attracts than the one cycle of the exact map."""
+    """Yield stages for which friso is certain of another number of attractors than the one exact cycle."""
     motions = [len(a.surveyed.motions) if a.certain and a.surveyed else 1 for a in answers]
     for words, wrong in (("nothing", np.equal(motions, 0)), ("more than one motion", np.greater(motions, 1))):
         which = ", ".join(f"PID {k}" for k in np.flatnonzero(wrong))
@@ -181,7 +192,7 @@ def at_the_limit(answers: Sequence[Hunting], sharpness: float) -> Iterator[Findi
 
 
 def towards(name: str, pid: Pid, amplitude: float) -> Finding:
-    """What friso says of a PID on the way to the limit, beside the exact limit cycle."""
+    """Compare what friso says about a PID on the way to the limit with the exact limit cycle."""
     steps = SHARPER[:4]
     off = [surveyed(stage(pid, sharpness)) / amplitude - 1 for sharpness in steps]
     words = [f"{100 * share:.2g} %" if np.isfinite(share) else "no cycle" for share in off]
@@ -190,15 +201,20 @@ def towards(name: str, pid: Pid, amplitude: float) -> Finding:
 
 
 def surveyed(one: Stage) -> float:
-    """Half of peak to peak of what attracts a stage by friso's survey [m]: of the largest closed cycle, or else of the
-    largest swing that was observed; NaN where nothing does."""
+    """Return half of peak to peak [m] of a stage's attractor by friso's survey.
+
+    It is that of the largest closed cycle, or else of the largest observed swing; NaN without an attractor.
+    """
     swings = find_swings(one.flat())
     cycles = [swing for swing in swings if swing.cycles is not None]
     return max((swing.amplitude for swing in cycles or swings), default=np.nan)
 
 
 def closed(one: Stage) -> float:
-    """Half of peak to peak of the cycle that friso closes where its return map has a fixed point [m]; NaN without."""
+    """Return half of peak to peak [m] of the cycle that friso closes at a fixed point of its return map.
+
+    NaN without one.
+    """
     return float(find_cycles(Ensemble.held(one.flat(), 1)).amplitude[0])
 
 
@@ -216,7 +232,7 @@ def never() -> Iterator[Finding]:
 
 
 def coulomb_stage(pid: Pid, law: str) -> Stage:
-    """The mass with Coulomb friction alone, on LuGre's bristles or on Dahl's."""
+    """Return the mass with Coulomb friction alone, on LuGre's or Dahl's bristles."""
     one = stage(pid, SHARPER[0], 0.0)
     if law == "lugre":
         return one

@@ -1,1 +1,1 @@
-"""Compares what the return map shows of hunting with what today's search shows: `python -m benchmarks.return_map`."""
+"""Compare what the return map and the search show about hunting: `python -m benchmarks.return_map`."""

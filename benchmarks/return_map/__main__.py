@@ -1,7 +1,7 @@
-"""Compares the check with the search alone, which asks no return map: `python -m benchmarks.return_map`.
+"""Compare the check with the search alone, without return maps: `python -m benchmarks.return_map`.
 
-Draws stages of three series, and takes the hard stages of the suite (`--series hard`) and the rig of the thesis
-(`--series rig`). Both answer each case; answers are kept in a file, a line each, and a run goes on where one was
+Stages are drawn from three series, or are the hard stages of the suite (`--series hard`) or the thesis rig (`--series
+rig`). Both methods answer each case. Answers are kept in a file, a line each, and a run continues where one was
 stopped. `--table` writes the page [The check against the search alone](return-map.md).
 """
 
@@ -33,7 +33,7 @@ from friso.stage import Stage
 
 HARD = Path(__file__).parents[2] / "tests" / "hard_stages.toml"
 ABOUT_HARD = ("name", "attracts", "own_motion", "evidence")
-"""Entries of the hard stages that are not of the stage."""
+"""Entries of the hard stages that do not belong to the stage file."""
 
 
 def main() -> None:
@@ -55,7 +55,7 @@ def main() -> None:
 
 
 def _cases(series: str, seed: int, number: int) -> Iterator[tuple[dict[str, Any], Stage]]:
-    """The cases of a stage that differ."""
+    """Yield the distinct cases of a stage."""
     stage, seen = _stage(series, seed, number), []
     if stage is None:
         return
@@ -77,7 +77,7 @@ def _stage(series: str, seed: int, number: int) -> Stage | None:
 
 
 def _answered(record: dict[str, Any], stage: Stage, before: dict[str, Any] | None) -> dict[str, Any]:
-    """What both say of a case; what the search said `before` is kept, if it did."""
+    """Return both answers on a case; an answer of the search from `before` is reused."""
     kernels(needed_kernels(stage))
     with np.errstate(all="ignore"):
         by_map = checked(stage)

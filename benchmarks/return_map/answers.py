@@ -1,4 +1,4 @@
-"""What a check shows of a stage, as data: by the return map where it goes, or by the search alone."""
+"""Convert a check's results to data: by the return map where it decides, or by the search alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.stage import Stage
 
 
 def checked(stage: Stage) -> dict[str, Any]:
-    """The answer about a stage whose joint is as given, the work of each part, and the CPU time [s]."""
+    """Return the answer on a stage as given, the work of each part, and the CPU time [s]."""
     parts: dict[str, float] = {}
     last = str(CheckPart.ATTRACTION)
     start = time.process_time()
@@ -46,21 +46,21 @@ def _as_data(said: Judgement) -> dict[str, Any]:
 
 
 def edge_as_data(edge: Margin) -> dict[str, Any]:
-    """The edge of hunting: its factor of the bandwidth, and what is known of it."""
+    """Return the edge of hunting as data: its factor of the bandwidth, and how certain it is."""
     return {"factor": edge.factor, "certain": edge.certain, "quiet": edge.quiet, "reserve": edge.reserve}
 
 
 def end_as_data(end: AttractionEnd | None) -> dict[str, Any] | None:
-    """An end of a window, in the same way; None where it lies beyond what was searched."""
+    """Return an end of a window as data; None if it lies beyond the range searched."""
     return end and {"factor": end.inside, "certain": end.certain, "quiet": end.outside, "reserve": end.reserve}
 
 
 def kick_as_data(kick: Kick) -> dict[str, Any]:
-    """Windows of kicks that start hunting."""
+    """Return the windows of kicks that start hunting."""
     return {"windows": kick.windows, "searched": kick.searched, "unknown": kick.unknown}
 
 
 def motion_as_data(motion: Swinging) -> dict[str, Any]:
-    """A motion that attracts."""
+    """Return an attracting motion as data."""
     closed = motion.cycles is not None
     return {"amplitude": motion.amplitude, "period": motion.period, "swings": motion.swings, "closed": closed}

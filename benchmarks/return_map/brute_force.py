@@ -1,4 +1,7 @@
-"""Which of two answers is right where they differ: starts from everywhere, as the adversary follows them, decide."""
+"""Decide which of two different answers is right, by starts from everywhere.
+
+Runs are followed as the adversary (`benchmarks.truth`) follows them.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,11 @@ from friso.equations.bandwidth import faster
 from friso.stage import Stage
 
 STARTS = 24, 12, 24, 12
-"""Releases, pushes, stuck and drawn starts."""
+"""Numbers of releases, pushes, stuck and drawn starts."""
 
 
 def decided(record: dict[str, Any], stage: Stage) -> str:
-    """What swings on where the answers about a stage differ: at its own bandwidth, or between both edges."""
+    """Return what keeps swinging where the answers differ: at the stage's bandwidth, or between both edges."""
     search, by_map = record["searched"], record["mapped"]
     if not by_map["certain"] or not search["certain"]:
         return ""

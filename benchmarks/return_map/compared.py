@@ -1,4 +1,4 @@
-"""The check against the search alone: counted by class of machine, as a page of Markdown."""
+"""Compare the check with the search alone, counted by class of machine, as a page of Markdown."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from benchmarks.truth.tally import markdown
 from friso.hunting import SEARCH_LIMITS
 
 KICK = 0.02
-"""Share by which limits of kicks may differ that are the same."""
+"""Relative difference up to which limits of kicks count as equal."""
 
 Record = dict[str, Any]
 
 
 def page(records: Sequence[Record]) -> str:
-    """The comparison: by class, and what differs."""
+    """Return the comparison: counts by class, and the differences."""
     usable = [record for record in records if record["searched"]["possible"]]
     names = sorted({name for record in usable for name in record["classes"]})
     groups = {name: [record for record in usable if name in record["classes"]] for name in names} | {"all": usable}
@@ -55,7 +55,7 @@ def page(records: Sequence[Record]) -> str:
 
 
 def counted(records: Sequence[Record]) -> dict[str, Any]:
-    """What the columns of the table hold, of some cases."""
+    """Return the entries of the table's columns for some cases."""
     both = [record for record in records if _both_certain(record)]
     edges = [record for record in both if _has_edge(record)]
     windows = [(record, window) for record in both for window in _windows(record)]
@@ -76,7 +76,7 @@ def counted(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def differences(record: Record) -> Iterator[str]:
-    """In what the check differs from the search, where both are certain."""
+    """Yield how the check differs from the search, where both are certain."""
     search, by_map = record["searched"], record["mapped"]
     if not _both_certain(record):
         return
@@ -94,12 +94,12 @@ def differences(record: Record) -> Iterator[str]:
 
 
 def same_verdict(record: Record) -> bool:
-    """Whether the verdicts are the same."""
+    """Tell whether the verdicts are equal."""
     return bool(record["mapped"]["verdict"] == record["searched"]["verdict"])
 
 
 def same_edge(record: Record) -> bool:
-    """Whether the edge of the search lies in an interval that the check tells, up to what the search leaves open."""
+    """Tell whether the search's edge lies in an interval of the check, within the search's own error."""
     edge, by_map = record["searched"]["edge"], record["mapped"]
     ends = [by_map["edge"], *(high for _, high in by_map["windows"])]
     reserve = edge["reserve"] + 1e-3
@@ -111,7 +111,7 @@ def same_edge(record: Record) -> bool:
 
 
 def has_window(record: Record, window: Sequence[Any]) -> bool:
-    """Whether the check shows a window at the middle of one of the search."""
+    """Tell whether the check shows a window at the middle of a window of the search."""
     middle = _middle(window)
     for low, high in record["mapped"]["windows"]:
         above = low is None or low["factor"] <= middle * (1 + KICK)
@@ -121,7 +121,7 @@ def has_window(record: Record, window: Sequence[Any]) -> bool:
 
 
 def same_kicks(record: Record) -> bool:
-    """Whether all limits of the displacements that start hunting are the same."""
+    """Tell whether all limits of the displacements that start hunting are equal."""
     search, by_map = record["searched"]["kick"]["windows"], (record["mapped"]["kick"] or {"windows": ()})["windows"]
     if len(search) != len(by_map):
         return False
@@ -129,13 +129,16 @@ def same_kicks(record: Record) -> bool:
 
 
 def _has_edge(record: Record) -> bool:
-    """Whether the search has a certain edge among the bandwidths that the check covers: it may have reached farther."""
+    """Tell whether the search has a certain edge in the range of the check.
+
+    The search may have reached farther.
+    """
     edge = record["searched"]["edge"]
     return bool(edge and edge["certain"] and edge["factor"] > SEARCH_LIMITS.lowest_bandwidth)
 
 
 def _windows(record: Record) -> list[Sequence[Any]]:
-    """The windows of the search among the bandwidths that the check covers."""
+    """Return the windows of the search in the range of the check."""
     lowest, windows = SEARCH_LIMITS.lowest_bandwidth, record["searched"]["windows"]
     within = [window for window in windows if not window[1] or window[1]["factor"] > lowest]
     return [window for window in within if _middle(window) > lowest]
@@ -156,7 +159,7 @@ def _gave_up(answer: Record) -> bool:
 
 
 def _decided(record: Record, difference: str) -> str:
-    """What brute force says of a difference."""
+    """Return what brute force says about a difference."""
     return f"; {record['decided']}" if "decided" in record and not difference.startswith("no window") else ""
 
 

@@ -1,7 +1,8 @@
-"""Damaged files, kills, interrupts, full disks: `python -m benchmarks.trust [CAMPAIGN ...]`.
+"""Test damaged files, kills, interrupts, full disks: `python -m benchmarks.trust [CAMPAIGN ...]`.
 
-Every failure is printed with what runs it again alone: the campaign, its seed, and the number of the case. Bounded in
-count (`--cases` of each campaign of light cases, a share of it of heavier ones) and time (`--minutes` in all).
+Every failure is printed with what repeats it alone: the campaign, its seed, and the number of the case. The work is
+bounded in count (`--cases` for each campaign of light cases, a fraction of it for heavier ones) and in time
+(`--minutes` in all).
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from benchmarks.report import print_table
 from benchmarks.trust.campaign import BINARY_LOGS, COMMANDS, HEAVY, NAMES, Part, run_part
 
 SHARE = 6
-"""How much more time a campaign of light cases may take than one of heavy cases; what is left of it is the next's."""
+"""Time of a campaign of light cases over that of a campaign of heavy ones. The next campaign gets the time left
+over."""
 
 PART = {name: 1 if name in COMMANDS else 10 for name in HEAVY}
-"""How many cases are run in one go; of light ones 100."""
+"""Number of cases run in one go, for heavy campaigns; light ones run 100."""
 
 
 GROUPS = {
@@ -28,11 +30,11 @@ GROUPS = {
     "heavy": [*COMMANDS],
     "binary-logs": BINARY_LOGS,
 }
-"""Campaigns that have a name together: those within this process, those of commands as processes, binary logs."""
+"""Groups of campaigns with a common name: within this process, commands as processes, binary logs."""
 
 
 def main() -> int:
-    """Run the campaigns; 1 where a case failed."""
+    """Run the campaigns; return 1 if a case failed."""
     arguments = _arguments()
     names = [name for group in arguments.campaigns or [*GROUPS] for name in GROUPS.get(group, [group])]
     end = time.monotonic() + 60 * arguments.minutes
@@ -63,7 +65,7 @@ def main() -> int:
 
 
 def _parts(name: str, seed: int, numbers: range, jobs: int, end: float) -> Iterator[Part]:
-    """The cases in parts, side by side in processes, until the time is over."""
+    """Yield the cases in parts, side by side in processes, until the time is over."""
     size = PART.get(name, 100)
     upcoming = iter([numbers[k : k + size] for k in range(0, len(numbers), size)])
     with ProcessPoolExecutor(jobs) as pool:

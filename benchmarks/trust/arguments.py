@@ -1,5 +1,8 @@
-"""Arguments of every public function and every command: of other types, empty, thousands of characters long, out of
-range. They are taken, or refused in one clear message with nothing written; what would be computed is not."""
+"""Test arguments of every public function and every command.
+
+They are of other types, empty, thousands of characters long, or out of range. They must be accepted, or refused in one
+clear message with nothing written. Nothing is computed.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +59,7 @@ CALLS: dict[str, dict[str, Any]] = {
     "sweep": {"stage": RIG, "x": "controller.crossover=2 Hz..16 Hz:3"},
     "tuning": {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7},
 }
-"""Sound arguments of every public function."""
+"""Valid arguments of every public function."""
 
 LINES: dict[str, list[str]] = {
     **{name: [name, RIG] for name in ("bode", "check", "simulate", "tune")},
@@ -78,7 +81,7 @@ LINES: dict[str, list[str]] = {
     "rig": ["rig", "stiffness", DRIVE],
     "schema": ["schema"],
 }
-"""A sound line of every command."""
+"""A valid line of every command."""
 
 _LONG = ("x" * 201, "x" * 256, "x" * 5000, "x/" * 700, "9" * 400, "9" * 5000, "a." * 10_000, "[" * 3000)
 TEXTS = (
@@ -89,7 +92,7 @@ TEXTS = (
     *("/dev/null", "/dev/full", "/dev/zero", "/proc/self/mem", "nowhere/a", "log.csv", "log.csv/a", "a.nc", "a.csv"),
     *("folder", "folder.nc", "a.zarr", "tcp://", "tcp://127.0.0.1:1", "http://[", *_LONG),
 )
-"""Texts that a user, or a script, may give by mistake or on purpose."""
+"""Texts that a user or a script may give, by mistake or on purpose."""
 
 VALUES: tuple[Any, ...] = (
     *("a\0b", None, True, 0, -1, 1, 10**18, 10**400, 10**5000, 1.5, float("nan"), float("inf"), 1e300, 1e-300, 1j),
@@ -97,15 +100,15 @@ VALUES: tuple[Any, ...] = (
     *((1, 2), {1, 2}, object(), print, RuntimeError, Path(), Path("nowhere/a"), Path("x" * 300), np.zeros(0)),
     *(np.zeros((2, 2)), np.array([1.0, np.nan]), np.array(["x"]), np.float64(3.0), np.int64(3), iter([1]), range(3)),
 )
-"""Values of other types, and at the ends of theirs."""
+"""Values of other types, and extreme values."""
 
 
 class Computed(BaseException):
-    """What was asked for is begun to be computed: all arguments were taken."""
+    """Error: computation would begin, because all arguments were accepted."""
 
 
 def arguments(rng: random.Random, folder: Path) -> None:
-    """One argument of a public function replaced."""
+    """Replace one argument of a public function."""
     name = rng.choice([*CALLS])
     function = getattr(friso, name)
     sound = {key: friso.load(value) if _wants_stage(name, key) else value for key, value in CALLS[name].items()}
@@ -128,7 +131,7 @@ def arguments(rng: random.Random, folder: Path) -> None:
 
 
 def options(rng: random.Random, folder: Path) -> None:
-    """One argument or option of a command replaced or added."""
+    """Replace or add one argument or option of a command."""
     name = rng.choice([*LINES])
     line, text = [*LINES[name]], rng.choice(TEXTS).replace("\0", "")
     valued = _valued_options()[name]
@@ -154,7 +157,7 @@ def options(rng: random.Random, folder: Path) -> None:
 
 
 def _run(line: list[str]) -> tuple[int, str]:
-    """Status and errors of a command in this process."""
+    """Return status and errors of a command in this process."""
     err = StringIO()
     with mock.patch.object(sys, "argv", line), redirect_stdout(StringIO()), redirect_stderr(err):
         try:
@@ -164,7 +167,10 @@ def _run(line: list[str]) -> tuple[int, str]:
 
 
 def assert_clear(what: str, message: str) -> None:
-    """Raises AssertionError for a message that is none, or that is longer than anyone reads."""
+    """Check that a message is clear.
+
+    Raises AssertionError for an empty message, or one that is longer than anyone reads.
+    """
     assert message.strip(), f"{what}: a refusal without words"
     longest = max(map(len, message.splitlines()))
     assert longest < 2000, f"{what}: a line of {longest} characters"
@@ -177,7 +183,7 @@ def _wants_stage(name: str, key: str) -> bool:
 
 @cache
 def _valued_options() -> dict[str, list[str]]:
-    """The options of every command that take a value."""
+    """Return the options of every command that take a value."""
     commands = typer.main.get_command(command_line()).commands  # type: ignore[attr-defined]
     return {
         name: [param.opts[0] for param in command.params if param.opts[0].startswith("--") and not param.is_flag]
@@ -187,8 +193,10 @@ def _valued_options() -> dict[str, list[str]]:
 
 @contextmanager
 def nothing_computed() -> Iterator[None]:
-    """Kernels are neither built nor loaded, those that are loaded are not there, and nothing is served: Computed is
-    raised instead. Pictures are empty."""
+    """Prevent computation in the block: Computed is raised instead.
+
+    Kernels are neither built nor loaded, loaded ones are hidden, and nothing is served. Pictures are empty.
+    """
 
     def computed(*_: object, **__: object) -> None:
         raise Computed
@@ -215,4 +223,4 @@ def _tree(folder: Path) -> set[str]:
 
 
 ARGUMENTS = {"arguments": arguments, "options": options}
-"""The campaigns by name."""
+"""Campaigns by name."""

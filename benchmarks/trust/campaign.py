@@ -1,4 +1,7 @@
-"""Cases of a campaign: each follows from the seed, the campaign and its number, so that it can be run again alone."""
+"""Run the cases of a campaign.
+
+Each case follows from the seed, the campaign and its number, so that it can be repeated alone.
+"""
 
 from __future__ import annotations
 
@@ -27,30 +30,30 @@ from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
 
 PATIENCE = 30
-"""How long [s] a refusal may take on a busy machine before it counts as endless."""
+"""Time [s] that a refusal may take on a busy machine before it counts as endless."""
 
 Case = Callable[[random.Random, Path], None]
-"""One case, which raises what it finds wrong: with its random numbers, in a folder of its own."""
+"""A case: a function of its random numbers and its folder, which raises what it finds wrong."""
 
 
 CASES: dict[str, Case] = {**ARGUMENTS, "drawn-stages": stages, "app": questions, **WRITING, **COMMANDS}
-"""The campaigns but for those of `READERS`."""
+"""Campaigns besides those of `READERS`."""
 
 NAMES = (*READERS, *CASES)
 """All campaigns."""
 
 BINARY_LOGS = [f"{kind}-logs" for kind in BINARY]
-"""Those of binary logs."""
+"""Campaigns of binary logs."""
 
 HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "options": 32, "app": 8, "stores": 16,
          "store-faults": 32, "store-views": 16, "store-exchanges": 32, "store-versions": 8,
          **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
-"""By how much fewer the cases of a campaign are whose cases take long."""
+"""Factor by which campaigns with slow cases have fewer cases."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """How many cases were run, the numbers of those that failed, and why, and why others could not be run here."""
+    """Results of cases: how many were run, the numbers of failed ones with reasons, and why others could not be run."""
 
     count: int
     failures: list[tuple[int, str]]
@@ -76,12 +79,15 @@ def run_part(name: str, seed: int, numbers: range, end: float = float("inf")) ->
 
 @cache
 def case_of(name: str) -> Case:
-    """The case of a campaign."""
+    """Return the case of a campaign."""
     return CASES.get(name) or reading(name)
 
 
 def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:
-    """What went wrong in a case, None for nothing. Raises LeftOut where it cannot be run here."""
+    """Return what went wrong in a case, or None.
+
+    Raises LeftOut if it cannot be run here.
+    """
     rng = random.Random(f"{seed} {campaign} {number}")
     with tempfile.TemporaryDirectory(prefix="friso-trust-") as folder:
         try:
@@ -96,7 +102,7 @@ def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:
 
 @contextmanager
 def _silent_log() -> Iterator[None]:
-    """What friso says of damage is not printed."""
+    """Suppress friso's messages about damage."""
     logging.disable(logging.CRITICAL)
     try:
         yield
@@ -105,7 +111,10 @@ def _silent_log() -> Iterator[None]:
 
 
 def reading(name: str) -> Case:
-    """Damaged files of a kind are read, or refused; the sound ones that they are made of are read."""
+    """Return a case that reads a damaged file of a kind.
+
+    The file must be read, or refused; the intact one must be read.
+    """
     reader = READERS[name]
     contents = reader.contents()
     for content in contents:
@@ -131,7 +140,7 @@ def reading(name: str) -> Case:
 
 @contextmanager
 def _patience() -> Iterator[None]:
-    """Raises TimeoutError where what is within takes too long."""
+    """Raise TimeoutError if the block takes too long."""
 
     def over(number: int, frame: object) -> None:
         raise TimeoutError(f"more than {PATIENCE} s")

@@ -1,4 +1,7 @@
-"""Commands that write, as processes: killed, interrupted, short of disk, two at once, without their workers."""
+"""Test commands that write, as processes.
+
+They are killed, interrupted, short of disk, run two at once, or lose their workers.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,7 @@ QUICK: dict[str, list[str]] = {
     "map": MAP,
     "exports": [*MAP, "--export", "a.csv", "--export", "a.nc"],
 }  # fmt: skip
-"""Commands that write, by a name of the case, which end within seconds."""
+"""Commands that write and end within seconds, by the name of the case."""
 
 WRITING: dict[str, list[str]] = {
     **QUICK,
@@ -57,22 +60,25 @@ WRITING: dict[str, list[str]] = {
 """All commands that write."""
 
 ONE_FILE = {name for name, line in WRITING.items() if line[0] in ("init", "example")}
-"""Those that write one file and no folder."""
+"""Commands that write one file and no folder."""
 
 LONGEST = 8.0
-"""How long [s] after its start a command is killed or interrupted, at most."""
+"""Longest time [s] after its start at which a command is killed or interrupted."""
 
 PATIENCE = 120
-"""How long [s] a command may take to end on a busy machine, once it is told to."""
+"""Time [s] that a command may take to end on a busy machine, once it has to."""
 
 
 class LeftOut(Exception):
-    """This case cannot be run here, and why."""
+    """Error: a case cannot be run here, with the reason."""
 
 
 def killed(rng: random.Random, folder: Path) -> None:
-    """A command killed up to three times: no file is there in part, and what is left goes with the next that writes
-    there; one that ends quickly, run again, leaves what it does undisturbed: the same bytes, and nothing else."""
+    """Kill a command up to three times.
+
+    No file may be partial, and the next command that writes there removes leftovers. A command that ends quickly, run
+    again, must leave what it leaves undisturbed: the same bytes, and nothing else.
+    """
     name = rng.choice([*WRITING, "map", "exports"])
     _prepare(name, folder)
     for _ in range(rng.randrange(1, 4)):
@@ -90,8 +96,11 @@ def killed(rng: random.Random, folder: Path) -> None:
 
 
 def interrupted(rng: random.Random, folder: Path) -> None:
-    """Ctrl-C or a termination: the status that shells know and one line (or two, where a study can be resumed), and the
-    files whole or not at all."""
+    """Send Ctrl-C or a termination.
+
+    The status must be the one that shells know, with one line (or two, if a study can be resumed), and files must be
+    complete or absent.
+    """
     name = rng.choice([*WRITING])
     number = rng.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
     _prepare(name, folder)
@@ -110,7 +119,10 @@ def interrupted(rng: random.Random, folder: Path) -> None:
 
 
 def short_of_disk(rng: random.Random, folder: Path) -> None:
-    """No file may become larger than some size: one message, status 1, and the files whole or not at all."""
+    """Limit the size of files.
+
+    There must be one message, status 1, and files that are complete or absent.
+    """
     name = rng.choice([*QUICK])
     import resource  # Windows has none
 
@@ -126,7 +138,11 @@ def short_of_disk(rng: random.Random, folder: Path) -> None:
 
 
 def small_disk(rng: random.Random, folder: Path) -> None:
-    """The same on a disk of its own that is nearly full; left out where this user may mount none."""
+    """Run out of space on a small disk.
+
+    There must be one message, status 1, and files that are complete or absent. The case is left out if this user may
+    mount no disk.
+    """
     name, size = rng.choice([*QUICK]), rng.choice((16, 64, 256, 1024, 4096))
     disk = folder / "disk"
     disk.mkdir()
@@ -145,7 +161,10 @@ def small_disk(rng: random.Random, folder: Path) -> None:
 
 
 def read_only(rng: random.Random, folder: Path) -> None:
-    """A folder that may not be written into: status 2 before anything is computed, and nothing is written."""
+    """Write into a read-only folder.
+
+    The status must be 2 before anything is computed, and nothing may be written.
+    """
     name, below = rng.choice([*WRITING]), rng.random() < 0.5
     closed = folder / "closed"
     closed.mkdir()
@@ -164,13 +183,13 @@ def read_only(rng: random.Random, folder: Path) -> None:
 
 
 def _without_root_s_rights() -> list[str]:
-    """What to put before a command so that permissions hold for it: root may write everywhere else."""
+    """Return what to put before a command so that permissions apply to it: root may write everywhere."""
     rights = "-dac_override,-dac_read_search,-fowner"
     return ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []
 
 
 def two_at_once(rng: random.Random, folder: Path) -> None:
-    """Two maps on one store and one cache that is empty: one of them runs, the other is refused or finds all done."""
+    """Run two maps on one store with an empty cache: one runs, the other is refused or finds all done."""
     environ = {**os.environ, "FRISO_CACHE_DIR": str(folder / "cache")}
     first = _started(folder, MAP, environ)
     time.sleep(rng.uniform(0.0, 3.0))
@@ -184,7 +203,7 @@ def two_at_once(rng: random.Random, folder: Path) -> None:
 
 
 def without_workers(rng: random.Random, folder: Path) -> None:
-    """A worker is killed: the map ends in one sentence, at once, and goes on where it was."""
+    """Kill a worker: the map must end at once in one sentence, and continue where it was."""
     with _started(folder, [*MAP, "--workers", str(min(2, os.cpu_count() or 1))]) as process:
         while process.poll() is None and not any(folder.glob("a.zarr/.blocks/*")):  # none of the study is done
             time.sleep(0.01)
@@ -199,7 +218,7 @@ def without_workers(rng: random.Random, folder: Path) -> None:
 
 
 def without_scheduler(rng: random.Random, folder: Path) -> None:
-    """The scheduler goes while a map is run on it: one sentence, and it goes on without."""
+    """End the scheduler while a map runs on it: there must be one sentence, and a resumed run without it."""
     place = folder / "scheduler.json"
     with subprocess.Popen([sys.executable, "-c", SCHEDULER, str(place)], stderr=subprocess.DEVNULL) as scheduler:
         while not place.exists() and scheduler.poll() is None:
@@ -237,7 +256,7 @@ COMMANDS: dict[str, Callable[[random.Random, Path], None]] = {
     "without-workers": without_workers,
     "without-scheduler": without_scheduler,
 }
-"""The campaigns by name."""
+"""Campaigns by name."""
 
 
 def _started(folder: Path, arguments: list[str], environ: dict[str, str] | None = None) -> subprocess.Popen[str]:
@@ -250,14 +269,14 @@ def _finished(folder: Path, arguments: list[str]) -> subprocess.CompletedProcess
 
 
 def _takes_signals(number: int) -> bool:
-    """Whether friso's own code runs in a process, and has taken the signals that end it."""
+    """Tell whether friso's own code runs in a process, and handles the signals that end it."""
     status = Path(f"/proc/{number}/status").read_text()
     caught = int(next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), 16)
     return bool(caught & 1 << (signal.SIGTERM - 1))
 
 
 def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str]) -> None:
-    """Wait for a moment at random, or until something is written."""
+    """Wait for a random moment, or until something is written."""
     at_writing = rng.random() < 0.5
     end, after = time.monotonic() + (LONGEST if at_writing else rng.uniform(0.0, LONGEST)), rng.expovariate(5.0)
     while time.monotonic() < end and process.poll() is None:
@@ -268,14 +287,14 @@ def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str]) ->
 
 
 def _prepare(name: str, folder: Path) -> None:
-    """Put what a command reads into its folder."""
+    """Put the input of a command into its folder."""
     if "log.csv" in WRITING[name]:
         shutil.copyfile(_undisturbed("simulate") / "out" / "log.csv", folder / "log.csv")
 
 
 @cache
 def _undisturbed(name: str) -> Path:
-    """A folder with what a command writes that nothing happened to."""
+    """Return a folder with what a command writes if nothing disturbs it."""
     folder = folder_until_the_end(name)
     _prepare(name, folder)
     done = _finished(folder, WRITING[name])
@@ -287,7 +306,10 @@ def _undisturbed(name: str) -> Path:
 
 
 def _assert_as(expected: Path, folder: Path, name: str) -> None:
-    """Raises AssertionError where a folder holds other files than expected, or others in content."""
+    """Check that a folder holds the expected files.
+
+    Raises AssertionError for other files, or other contents.
+    """
     there, here = _tree(expected), _tree(folder)
     if name == "simulate":
         there = {key: value for key, value in there.items() if not key.endswith(".csv")}
@@ -309,7 +331,7 @@ def _assert_told(what: str, done: subprocess.CompletedProcess[str]) -> None:
 
 
 def _kill_all(number: int) -> None:
-    """Kill a process and those that it started."""
+    """Kill a process and the processes that it started."""
     parent = psutil.Process(number)
     for process in (*parent.children(recursive=True), parent):
         with suppress(psutil.NoSuchProcess):
@@ -317,14 +339,17 @@ def _kill_all(number: int) -> None:
 
 
 def _tree(folder: Path) -> dict[str, bytes]:
-    """What is in the files of a folder, but for locks."""
+    """Return the contents of the files of a folder, without locks."""
     files = (path for path in folder.rglob("*") if path.is_file() and not path.name.endswith(".lock"))
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
 def _whole_or_nothing(name: str, folder: Path, done: bool) -> None:
-    """Raises AssertionError where files of a command are there in part. A map keeps its store, and what is done of long
-    work is kept in a folder of its own."""
+    """Check that files of a command are complete.
+
+    Raises AssertionError for partial files. A map keeps its store, and finished parts of long work are kept in a folder
+    of their own.
+    """
     left = [path.name for path in folder.rglob("*") if path.name.startswith(DRAFTS)]
     assert not left, f"{name} left {left}"
     if WRITING[name][0] == "map":

@@ -1,4 +1,4 @@
-"""Damage to files: what disks, editors and hostile people make of them, drawn at random."""
+"""Damage files at random, as disks, editors and hostile people do."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TOKENS = (
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
-    """The content after one to four changes."""
+    """Return the content after one to four changes."""
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         content = rng.choice(_CHANGES)(content, rng)
     return content
@@ -49,7 +49,7 @@ def _repeat(content: bytes, rng: random.Random) -> bytes:
 
 
 def _number(content: bytes, rng: random.Random) -> bytes:
-    """Another number in place of one."""
+    """Replace one number by another."""
     places = [k for k, sign in enumerate(content) if 48 <= sign <= 57]
     if not places:
         return content
@@ -58,7 +58,7 @@ def _number(content: bytes, rng: random.Random) -> bytes:
 
 
 def _lines(content: bytes, rng: random.Random) -> bytes:
-    """Two lines exchanged, or one of them lost."""
+    """Exchange two lines, or lose one."""
     lines = content.split(b"\n")
     a, b = rng.randrange(len(lines)), rng.randrange(len(lines))
     lines[a], lines[b] = lines[b], lines[a]

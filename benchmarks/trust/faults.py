@@ -1,5 +1,7 @@
-"""Faults at a chosen operation on files: a full disk, Ctrl-C, a kill. Python tells of each operation before it does it
-(`sys.addaudithook`)."""
+"""Cause faults at a chosen operation on files: a full disk, Ctrl-C, a kill.
+
+Python reports each operation before it happens (`sys.addaudithook`).
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,15 @@ from pathlib import Path
 from typing import Any
 
 _MAKES = {"os.rename": 1, "os.link": 1, "os.mkdir": 0}
-"""Operations that make something, and which of their arguments names it."""
+"""Operations that create something, and the index of the argument that names it."""
 
 
 @dataclass
 class Fault:
-    """What happens at the operation number `left` in a folder, and (a disk that stays full) at all after it that need
-    room."""
+    """A fault at the operation number `left` in a folder.
+
+    If it lasts, like a full disk, it also strikes at all later operations that need room.
+    """
 
     folder: str
     left: int
@@ -55,7 +59,10 @@ def _hook(event: str, arguments: tuple[Any, ...]) -> None:
 
 @contextmanager
 def fault(folder: Path, number: int, strike: Callable[[], None], lasting: bool = False) -> Iterator[None]:
-    """`strike` is called before the operation with this number, from 1, that makes something in a folder."""
+    """Call `strike` within the block before a numbered operation that creates something in a folder.
+
+    Operations count from 1.
+    """
     global _fault
     _install()
     _fault = Fault(str(folder.resolve()), number, strike, lasting)
@@ -75,22 +82,25 @@ def _install() -> None:
 
 
 def no_room() -> None:
-    """A full disk."""
+    """Raise the error of a full disk."""
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def no_answer() -> None:
-    """A disk that fails."""
+    """Raise the error of a disk that fails."""
     raise OSError(errno.EIO, os.strerror(errno.EIO))
 
 
 def ctrl_c() -> None:
-    """Ctrl-C, as the terminal sends it."""
+    """Send Ctrl-C as the terminal does."""
     os.kill(os.getpid(), signal.SIGINT)
 
 
 def struck(work: Callable[[], object], folder: Path, rng: random.Random, operations: int) -> str:
-    """Do some work of about so many operations on files under a fault drawn at random; which that was."""
+    """Do some work under a random fault; return which fault it was.
+
+    `operations` is roughly the number of operations on files.
+    """
     kind = rng.choice(("none", "room", "room", "disk", "ctrl-c", "ctrl-c", "kill", "kill"))
     number = rng.randrange(1, operations + 1)
     if kind == "kill":
@@ -107,7 +117,7 @@ def struck(work: Callable[[], object], folder: Path, rng: random.Random, operati
 
 
 def _killed(work: Callable[[], object], folder: Path, number: int) -> None:
-    """Do some work in a child that is killed before an operation."""
+    """Do some work in a child process that is killed before an operation."""
     child = os.fork()
     if child:
         os.waitpid(child, 0)

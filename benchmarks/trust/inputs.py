@@ -1,4 +1,4 @@
-"""What commands and functions of the campaign read: examples of friso, and a folder with a log in it."""
+"""Provide inputs for commands and functions of the campaigns: friso's examples, and a log in a folder."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ SPEC = str(EXAMPLES / "specs" / "thesis.toml")
 AXIS = str(EXAMPLES / "drives" / "linuxcnc_torque_axis.ini")
 ANSWERS = ("force_per_output=10 N", "masses.stage=3 kg", "friction.model=none", "motion.acceleration=1 m/s^2",
            "motion.acceleration_time=30 ms")  # fmt: skip
-"""What the parameter file does not tell."""
+"""Answers that the parameter file does not contain."""
 
 LOG = "time [s],position [m],force [N]\n" + "".join(f"{k / 1000},{(k % 50) * 1e-6},{k % 7}\n" for k in range(200))
 
 
 def folder_until_the_end(name: str) -> Path:
-    """A folder that goes with this process; what killed ones left of theirs goes now."""
+    """Make a folder that is removed with this process; remove folders of killed processes."""
     held = ExitStack()
     folder = held.enter_context(temporary_folder("friso-undisturbed-")) / name
     Finalize(None, held.close, exitpriority=1)  # processes of a pool end without what atexit knows
@@ -34,7 +34,7 @@ def folder_until_the_end(name: str) -> Path:
 
 @contextmanager
 def ready(folder: Path) -> Iterator[None]:
-    """A folder with a log and folders in it, in which it is worked for so long."""
+    """Work in a folder with a log and folders in it, within the block."""
     (folder / "log.csv").write_text(LOG)
     for name in ("folder", "folder.nc"):
         (folder / name).mkdir()

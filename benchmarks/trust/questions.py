@@ -1,5 +1,7 @@
-"""What a page of `friso app` sends, with parts of it of other types, damaged, out of range: each question is answered,
-or refused in one clear message; what would be computed is not."""
+"""Test what a page of `friso app` sends, with parts of other types, damaged, or out of range.
+
+Each question must be answered, or refused in one clear message. Nothing is computed.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "map.zip": AXES,
     "boundary.zip": AXES,
 }
-"""Sound options of the questions that take any."""
+"""Valid options of the questions that take any."""
 
 CHANGES = {"controller.crossover": "9 Hz", "joint.locked": True, "masses.stage": None}
 
@@ -40,7 +42,7 @@ VALUES: tuple[Any, ...] = (
 
 
 def questions(rng: random.Random, folder: Path) -> None:
-    """One or two parts of what a page sends replaced."""
+    """Replace one or two parts of what a page sends."""
     name = rng.choice([*QUESTIONS, *(f"{name}.zip" for name in COMMANDS)])
     stage = Path(LEAVES if name.startswith("flexure") else RIG)
     machine = {"name": stage.name, "text": stage.read_text("utf-8"), "changes": dict(CHANGES)}
@@ -70,7 +72,7 @@ def questions(rng: random.Random, folder: Path) -> None:
 
 
 def _replace(data: dict[str, Any], rng: random.Random) -> None:
-    """Replace what stands at some place of nested tables, or damage a text there."""
+    """Replace an entry at some place of nested tables, or damage a text there."""
     table = data
     while True:
         key = rng.choice([*table, rng.choice(TEXTS)]) if table else rng.choice(TEXTS)

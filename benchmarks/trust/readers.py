@@ -1,5 +1,7 @@
-"""What friso reads: a sound example of each kind of file, and the function that reads it, which may refuse it with an
-InputError and must do nothing else."""
+"""List what friso reads: an intact example of each kind of file, and the function that reads it.
+
+The function may refuse the file with an InputError and must do nothing else.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,7 @@ RIG = ROOT / "examples" / "thesis_rig.toml"
 
 @dataclass(frozen=True)
 class Reader:
-    """A kind of file: its name on disk, sound contents, and what reads it."""
+    """A kind of file: its name on disk, intact contents, and the function that reads it."""
 
     file: str
     contents: Callable[[], list[bytes]]
@@ -71,7 +73,7 @@ def _log(path: Path) -> None:
 
 
 def _binary_log(path: Path) -> None:
-    """As it is read, but for the start of Python: what reads is a copy of this process."""
+    """Read a log as friso does, but in a copy of this process instead of a new Python."""
     with mock.patch.object(confined, "_answer", _forked):
         _log(path)
 
@@ -120,7 +122,7 @@ def _texts() -> list[bytes]:
 
 
 def _binaries(kind: str) -> list[bytes]:
-    """What the programs of measurement write, as the tests make it: MAT files of four kinds, TDMS, UFF and LVM."""
+    """Return files as measuring programs write them, made by the tests: four kinds of MAT, TDMS, UFF, LVM."""
     motion = log_files.motion(200)
     time, names = motion["time"], ("position", "force")
     plain = {name: motion[name] for name in names}
@@ -176,4 +178,4 @@ READERS = {
     "logs": Reader("log.csv", _texts, _log),
     **{f"{kind}-logs": Reader("log.bin", partial(_binaries, kind), _binary_log) for kind in BINARY},
 }
-"""The kinds by the name of their campaign."""
+"""Kinds of files by the name of their campaign."""

@@ -1,6 +1,8 @@
-"""Stages drawn from all that the schema of the stage file allows: tables, kinds and keys at random, with the values of
-its examples. What does not fit together is mended as the error says, or left out. Every function takes such a stage, or
-refuses it in one clear message; what would be computed is not."""
+"""Draw stages from all that the schema of the stage file allows.
+
+Tables, kinds and keys are random, with the values of the schema's examples. Contradictions are mended as the error
+says, or left out. Every function must accept such a stage, or refuse it in one clear message. Nothing is computed.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +24,13 @@ from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
 ALWAYS = ("masses", "friction", "controller", "motion")
 STEEL = "stainless 1.4310"
-"""The material of leaf springs, the one text that is no choice."""
+"""Material of leaf springs, the only free text."""
 
 TABLES, KEYS, OFTEN = 0.2, 0.25, {"joint": 0.5, "transmission": 0.4, "drive": 0.4}
-"""How often a table, and a key, that need not be there is, and some tables more often."""
+"""Probability of an optional table, and of an optional key, and higher ones for some tables."""
 
 MENDED = 20
-"""So many mistakes of a drawn stage are mended at most."""
+"""Most mistakes of a drawn stage that are mended."""
 
 
 ASKED = [name for name, sound in CALLS.items() if "stage" in sound and name != "save"]
@@ -36,7 +38,7 @@ ASKED = [name for name, sound in CALLS.items() if "stage" in sound and name != "
 
 
 def stages(rng: random.Random, folder: Path) -> None:
-    """A drawn stage handed to a function, with a range of one of its keys where one is needed."""
+    """Pass a drawn stage to a function, with a range of one of its keys if needed."""
     stage, name = next(drawn_stages(rng)), rng.choice(ASKED)
     sound = {key: value for key, value in CALLS[name].items() if key != "stage"}
     if "x" in sound:
@@ -58,7 +60,7 @@ def stages(rng: random.Random, folder: Path) -> None:
 
 
 def _range_of(stage: Stage, rng: random.Random) -> str:
-    """A numeric key of a stage, over a tenth of its value."""
+    """Return a numeric key of a stage with a range of a tenth of its value."""
     flat, fields = stage.flat(), stage.numeric_keys()
     key = rng.choice([key for key in fields if flat.get(key)])
     ends = (f"{share * float(flat[key])!r} {fields[key].unit}".strip() for share in (1.0, 1.1))
@@ -66,7 +68,7 @@ def _range_of(stage: Stage, rng: random.Random) -> str:
 
 
 def drawn_stages(drawn: random.Random) -> Iterator[Stage]:
-    """Stages that friso takes, without an end."""
+    """Yield stages that friso accepts, without end."""
     schema = friso.schema()["properties"]
     while True:
         if stage := _stage(_tables(schema, drawn)):
@@ -74,7 +76,7 @@ def drawn_stages(drawn: random.Random) -> Iterator[Stage]:
 
 
 def _stage(tables: dict[str, Any]) -> Stage | None:
-    """The stage of tables that are mended where friso refuses them; None where that does not help."""
+    """Build the stage of some tables, mended where friso refuses them; None if that fails."""
     for _ in range(MENDED):
         try:
             return Stage(**tables)
@@ -85,7 +87,7 @@ def _stage(tables: dict[str, Any]) -> Stage | None:
 
 
 def _mend(tables: dict[str, Any], error: friso.InputError) -> bool:
-    """Set what the error's example sets, or else leave out what is wrong; whether there was anything to."""
+    """Set what the error's example sets, or else leave out what is wrong; tell whether either was possible."""
     name, _, key = error.key.partition(",")[0].partition(".")
     table = tables.get(name)
     if not isinstance(table, dict):
@@ -102,7 +104,7 @@ def _mend(tables: dict[str, Any], error: friso.InputError) -> bool:
 
 
 def _set_in(example: str) -> dict[str, Any]:
-    """The keys that an error's example sets; none where it is more than that."""
+    """Return the keys that an error's example sets; none if it is more than that."""
     try:
         values = tomllib.loads(example.replace(", ", "\n").partition(" or ")[0])
     except tomllib.TOMLDecodeError:
@@ -121,7 +123,7 @@ def _tables(schema: Mapping[str, Any], drawn: random.Random) -> dict[str, Any]:
 
 
 def _on(kind: AxisKind, entry: Any) -> Any:
-    """The values of examples, which are those of a linear axis, in the units of another."""
+    """Convert values of examples, which belong to a linear axis, to the units of another."""
     if isinstance(entry, dict):
         return {key: _on(kind, value) for key, value in entry.items()}
     if isinstance(entry, list):
@@ -131,7 +133,7 @@ def _on(kind: AxisKind, entry: Any) -> Any:
 
 
 def _table(node: Mapping[str, Any], drawn: random.Random) -> dict[str, Any]:
-    """A table of one of its kinds: what it has to have, and some of what it may."""
+    """Draw a table of one of its kinds: all required keys, and some optional ones."""
     form = drawn.choice(node["anyOf"]) if "anyOf" in node else node
     keys = [key for key in form["properties"] if key in form["required"] or drawn.random() < KEYS]
     return {key: _value(form["properties"][key], drawn) for key in keys}

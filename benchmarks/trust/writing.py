@@ -1,4 +1,4 @@
-"""What friso writes, in this process and under faults at every operation on files: the files of a command, and stores.
+"""Test what friso writes in this process, under faults at every operation on files.
 
 No command is started and nothing simulated: a case takes milliseconds.
 """
@@ -34,8 +34,10 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:8", "joint.stroke": "0.1 mm..1 mm:8
 
 
 def files(rng: random.Random, folder: Path) -> None:
-    """The files of a command, where there may be earlier ones: all of them or none, each whole; what a kill leaves is
-    removed by the next."""
+    """Write the files of a command over earlier ones: all of them or none, each complete.
+
+    The next run removes what a kill leaves.
+    """
     out, names = folder / "out", [rng.choice(("a.txt", "b.txt", "c/d.txt", "c/e/f.txt")) for _ in range(4)]
     if rng.random() < 0.6:
         OutputFolder("check", out, False).write({name: f"old {name}" for name in rng.sample(names, 2)})
@@ -61,7 +63,7 @@ def files(rng: random.Random, folder: Path) -> None:
 
 
 def stores(rng: random.Random, folder: Path) -> None:
-    """A store that is damaged says so, and is mended by the next run or refused; never are other numbers shown."""
+    """Damage a store: it must say so, and be mended by the next run or refused, never show other numbers."""
     path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
     what = _damage(path, rng)
     try:
@@ -80,7 +82,7 @@ def stores(rng: random.Random, folder: Path) -> None:
 
 
 def store_faults(rng: random.Random, folder: Path) -> None:
-    """A store that is made and written under up to three faults is in the end as if there had been none."""
+    """Make and write a store under up to three faults: in the end it must be as without faults."""
     path, said = folder / "a.zarr", []
     for _ in range(rng.randrange(1, 4)):
         said.append(struck(lambda: _write_missing(path), folder, rng, 60))
@@ -93,8 +95,10 @@ def store_faults(rng: random.Random, folder: Path) -> None:
 
 
 def store_views(rng: random.Random, folder: Path) -> None:
-    """Figures and page beside a store, drawn again and again under faults: those of friso give way, whole, and those of
-    the user do not, however far an earlier run came."""
+    """Draw figures and page beside a store repeatedly under faults.
+
+    friso's files must be replaced as a whole, and the user's must stay, however far an earlier run came.
+    """
     path, said = Path(shutil.copytree(_undisturbed(), folder / "a.zarr")), []
     forms = ("html", "pdf", "png", "svg")
     mine = {folder / f"a.{form}": "mine" for form in forms if rng.random() < 0.1}
@@ -122,7 +126,7 @@ def store_views(rng: random.Random, folder: Path) -> None:
 
 
 def store_exchanges(rng: random.Random, folder: Path) -> None:
-    """A store in whose place another is to come under a fault: one of the two is there, whole."""
+    """Replace a store under a fault: one of the two must be there, complete."""
     path, said = Path(shutil.copytree(_undisturbed(), folder / "a.zarr")), []
     study = Request(friso.load(RIG), {"controller.crossover": "2 Hz, 3 Hz"}).study(["peaks"])
 
@@ -141,7 +145,7 @@ def store_exchanges(rng: random.Random, folder: Path) -> None:
 
 
 def store_versions(rng: random.Random, folder: Path) -> None:
-    """A store of another version, whole as it is, is refused or read as what it says, and not changed."""
+    """Open an intact store of another version: it must be refused or read as it says, and not changed."""
     path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
     document = json.loads((path / ".zmetadata").read_bytes())
     own, attributes = document["friso"], document["metadata"][".zattrs"]
@@ -152,7 +156,7 @@ def store_versions(rng: random.Random, folder: Path) -> None:
         attributes[name] = rng.choice((None, "", "{", 3, [], "NaN", "1e999", attributes.get(name)))
     if rng.random() < 0.5:
         del attributes[rng.choice([*attributes])]
-    if rng.random() < 0.8:  # as a friso would have sealed it
+    if rng.random() < 0.8:  # sealed as friso would seal it
         own["sha256"] = metadata.digest([document["metadata"], {k: own[k] for k in own if k != "sha256"}])
     for name in (".zmetadata", ".zmetadata.copy"):
         (path / name).write_text(json.dumps(document))
@@ -165,7 +169,7 @@ def store_versions(rng: random.Random, folder: Path) -> None:
 
 
 def _damage(path: Path, rng: random.Random) -> tuple[str, ...]:
-    """Damage a store; what was done, and to which files of it."""
+    """Damage a store; return what was done, and to which of its files."""
     every = sorted(item for item in path.rglob("*") if item.is_file() and item.name != ".friso.lock")
     first, second = rng.choice(every), rng.choice(every)
     kind = rng.choice(("bytes", "bytes", "exchange", "exchange alike", "gone", "empty", "copy"))
@@ -193,7 +197,7 @@ def _study() -> Study:
 
 @cache
 def _undisturbed() -> Path:
-    """The store that nothing happened to."""
+    """Return the store to which nothing happened."""
     path = folder_until_the_end("stores") / "a.zarr"
     sweep(friso.load(RIG), AXES, metrics=["peaks"], store=path)
     return path
@@ -206,7 +210,7 @@ def _columns() -> dict[str, np.ndarray]:
 
 
 def _write_missing(path: Path) -> None:
-    """Do what a run of the study does, but for the simulations."""
+    """Write missing blocks as a run of the study does, without simulations."""
     columns = _columns()
     with Store.opened(path, _study()) as store:
         for block in list(store.missing()):
@@ -224,7 +228,7 @@ def _assert_same(path: Path, what: str) -> None:
 
 
 def _contents(folder: Path) -> dict[str, str]:
-    """What is in the files of a folder, but for locks."""
+    """Return the contents of the files of a folder, without locks."""
     every = (item for item in folder.rglob("*") if item.is_file() and item.name not in (".friso.lock", "lock"))
     return {str(item.relative_to(folder)): item.read_bytes().decode("latin-1") for item in every}
 

@@ -1,1 +1,1 @@
-"""An adversary of friso's verdicts: `python -m benchmarks.truth` draws stages, checks them, tries to refute them."""
+"""Try to refute friso's verdicts: `python -m benchmarks.truth` draws stages, checks and attacks them."""

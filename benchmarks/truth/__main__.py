@@ -1,9 +1,9 @@
-"""Draws stages, checks them, and tries to refute every verdict and edge: `python -m benchmarks.truth`.
+"""Draw stages, check them, and try to refute every verdict and edge: `python -m benchmarks.truth`.
 
-Prints by class of machine how many verdicts and edges are certain and how many of these are wrong (their stage files,
-each with a note, are written to a folder), the CPU time of a check, and why what is not certain is not. Attacks are
-kept in a file, and a run goes on where one was stopped; interrupted, it prints what there is. `--number` takes single
-stages of a seed; `--checks` checks them, tries to refute nothing and keeps nothing.
+It prints by class of machine how many verdicts and edges are certain and how many of these are wrong (their stage
+files, each with a note, are written to a folder), the CPU time of a check, and why others are not certain. Attacks are
+kept in a file, and a run continues where one was stopped; when interrupted, it prints what there is. `--number` takes
+single stages of a seed; `--checks` only checks them, and keeps nothing.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def main() -> None:
 
 
 def _stays(record: Record, redo: bool) -> bool:
-    """Whether a stage is not attacked again."""
+    """Tell whether a stage is not attacked again."""
     return is_current(record) or not redo
 
 
@@ -72,7 +72,7 @@ def _tell(text: str) -> None:
 
 
 def _attack_all(arguments: argparse.Namespace, numbers: Sequence[int], keep: Callable[[Record], object]) -> None:
-    """Attack stages up to Ctrl-C; each attack is kept and told as it ends."""
+    """Attack stages until Ctrl-C; each attack is stored and printed as it ends."""
     start, busy = time.perf_counter(), 0.0
     try:
         with closing(_attacked(arguments, numbers)) as records:
@@ -86,7 +86,10 @@ def _attack_all(arguments: argparse.Namespace, numbers: Sequence[int], keep: Cal
 
 
 def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
-    """Compare runs with SciPy, stage by stage; those whose equations are not written by hand are left out."""
+    """Compare runs with SciPy, stage by stage.
+
+    Stages whose equations are not written by hand are left out.
+    """
     records: list[dict[str, Any]] = []
     try:
         for number in numbers:
@@ -105,7 +108,10 @@ def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
 
 
 def _attacked(arguments: argparse.Namespace, numbers: Sequence[int]) -> Generator[Record]:
-    """Attacks on stages as they end, several at a time. What has to be compiled is, ahead and side by side."""
+    """Yield attacks on stages as they end, several at a time.
+
+    Kernels are compiled ahead and side by side.
+    """
     series, seed = arguments.series, arguments.seed
     kernels(set().union(*(needed_kernels(draw(seed, number, series)) for number in numbers)))
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -124,7 +130,7 @@ def _attacked(arguments: argparse.Namespace, numbers: Sequence[int]) -> Generato
 
 
 def _end_with_parent() -> None:
-    """Have a worker leave Ctrl-C to the process that started it, and end with that, however it ends."""
+    """Make a worker leave Ctrl-C to its parent process, and end with the parent, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent

@@ -1,4 +1,4 @@
-"""One stage, drawn, checked and attacked; as a record that can be written to a file."""
+"""Draw, check and attack one stage, and record it for a file."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from friso.stage import Stage
 
 WORK = 4e9
 """Work of an attack on a claim (see `friso.engine.allowance`), about 50 s on one core: verdict, own motion, edge and
-margin in static friction in this order. SciPy's is not counted. Free joints whose limiter rattles would take a hundred
-times that."""
+margin in static friction in this order, without SciPy's. Free joints whose limiter chatters would take a hundred times
+that."""
 
 STOOD, WRONG, GIVEN_UP = "stood", "wrong", "given up"
 """What becomes of a verdict or an edge that is attacked."""
@@ -30,14 +30,16 @@ STOOD, WRONG, GIVEN_UP = "stood", "wrong", "given up"
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: bool, series: str) -> dict[str, Any]:
-    """What friso says of the stage with this number, of a series, and what refutes it (nothing is tried for `checks`
-    alone); stages that are refuted, or of which an error is raised, are written to a folder."""
+    """Return what friso says about a numbered stage of a series, and what refutes it.
+
+    With `checks` nothing is attacked. Stages that are refuted, or raise an error, are written to a folder.
+    """
     stage = draw(seed, number, series)
     record: dict[str, Any] = {"series": series, "seed": seed, "number": number, "claims": [], "refuted": []}
     try:
         _attack(stage, record, scipy_share, checks)
         record["error"] = ""
-    except Exception as error:  # a finding as well
+    except Exception as error:  # an error is a finding as well
         record["error"] = f"{type(error).__name__}: {error}"
     if record["refuted"] or record["error"]:
         _write(folder / f"{series}-{seed}-{number}", stage, record)
@@ -71,7 +73,7 @@ def _as_data(claim: Claim) -> dict[str, Any]:
 
 
 def _tried(claim: Claim, number: int, scipy_share: float) -> dict[str, Iterator[Refutation]]:
-    """The attempts to refute a claim, SciPy's too, where its turn has come."""
+    """Return the attempts to refute a claim, including SciPy's when it is its turn."""
     tried = attempts(claim, number)
     if "verdict" in tried and np.random.default_rng([number, 5]).random() < scipy_share:
         tried["verdict"] = chain(tried["verdict"], scipy_refutations(claim))
@@ -79,13 +81,16 @@ def _tried(claim: Claim, number: int, scipy_share: float) -> dict[str, Iterator[
 
 
 def _outcomes(tried: dict[str, Iterator[Refutation]]) -> tuple[dict[str, str], list[Refutation]]:
-    """What becomes of the parts of a claim that are attacked, within the same allowance, and what refutes them."""
+    """Return what becomes of the parts of an attacked claim, and what refutes them.
+
+    All parts share one allowance.
+    """
     outcomes, refuted = {}, []
     with allowance(WORK):
         for part, attempt in tried.items():
             before, ends_as = len(refuted), STOOD
             try:
-                refuted += attempt  # those that were found before it is given up stay
+                refuted += attempt  # those found before the attack is given up stay
             except Exhausted:
                 ends_as = GIVEN_UP
             outcomes[part] = WRONG if len(refuted) > before else ends_as
@@ -93,7 +98,7 @@ def _outcomes(tried: dict[str, Iterator[Refutation]]) -> tuple[dict[str, str], l
 
 
 def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:
-    """The stage file, and a note of what was said and what refutes it."""
+    """Write the stage file, and a note on what was said and what refutes it."""
     lines = [f"friso says {claim['says']}" for claim in record["claims"]]
     for refutation in record["refuted"]:
         word = "wrong" if refutation["sure"] else "wrong (not sure)"

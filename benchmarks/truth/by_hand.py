@@ -1,10 +1,10 @@
-"""A stage's equations written out by hand, sharing no code with friso but the reading of the stage file; for SciPy.
+"""Write a stage's equations by hand, for SciPy, sharing only the reading of the stage file with friso.
 
 Sources: thesis, Eq. 3 to 8 and Fig. 3; LuGre: doi:10.1109/9.376053; regularised Stribeck friction:
 doi:10.1016/0005-1098(94)90209-7; Dahl 1968; active disturbance rejection with its observer:
 doi:10.1007/s11768-023-00129-y; leaks and limits of integrals: docs/controllers.md. There are no events: the solver's
-own error control finds every kink. (Settings that act within a window of the error are not written out: it steps over
-windows that a motion passes fast.)
+own error control finds every kink. (Settings that act within a window of the error are left out, because the solver
+steps over windows that a motion passes fast.)
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from scipy.integrate import solve_ivp
 
 STATES = ("x", "v", "x_cart", "v_cart", "x_part", "v_part", "z", "filtered", "integral", "rate")
 X, V, XC, VC, XP, VP, Z, LOW, INTEGRAL, RATE = range(len(STATES))
-"""The last three are, of an observer, the error, the disturbance and the rate of the error that it estimates."""
+"""Indices of the states. The last three are, for an observer, its estimates of the error, the disturbance and the rate
+of the error."""
 
 KINDS = ("pid", "adrc")
 JOINTS = ("rigid", "locked", "touching", "free")
@@ -35,7 +36,7 @@ NAMES = (
     *("deadband", "motor", "k_drive", "d_drive", "play", "at_motor"),
     *("leak", "most", "observer", "feedback", "believed"),
 )
-"""What the equations contain, in the order of `_rate`."""
+"""Names of the numbers in the equations, in the order of `_rate`."""
 
 WRITTEN = (
     *("masses.", "friction.", "joint.", "parasitic.", "bias.", "motion.", "transmission.", "encoder."),
@@ -44,20 +45,23 @@ WRITTEN = (
     *("controller.force_limit", "controller.anti_windup", "controller.error_deadband"),
     *("controller.bandwidth", "controller.observer_ratio", "controller.integral_leak", "controller.integral_limit"),
 )
-"""How the keys begin that the equations contain."""
+"""Beginnings of the keys that the equations contain."""
 
 REST_BAND = 1e-3
-"""Share of the force limit beyond it over which the integrator comes to rest (clamping)."""
+"""Band beyond the force limit, as a fraction of it, over which the integrator comes to rest (clamping)."""
 
 
 class NotWritten(Exception):
-    """The equations of a stage are not among those written out here."""
+    """Error: the equations of a stage are not among those written here."""
 
 
 @dataclass(frozen=True)
 class ByHand:
-    """The equations of one stage: `numbers` in the order of `NAMES`, and the pieces of its reference, (pieces, 4):
-    start [s], position [m], velocity [m/s], acceleration [m/s^2]."""
+    """The equations of one stage.
+
+    `numbers` are in the order of `NAMES`. The pieces of its reference, (pieces, 4), are start [s], position [m],
+    velocity [m/s] and acceleration [m/s^2].
+    """
 
     numbers: np.ndarray
     pieces: np.ndarray
@@ -70,7 +74,10 @@ class ByHand:
 
     @property
     def scales(self) -> np.ndarray:
-        """Magnitudes of the states: by how much friction deflects the loop and the bristles, per time of the loop."""
+        """Return the magnitudes of the states.
+
+        They are the deflections of loop and bristles by friction, per time of the loop for velocities.
+        """
         n = dict(zip(NAMES, self.numbers, strict=True))
         length, omega = self.length, self.omega
         bristle = n["static"] / n["sigma0"] if n["sigma0"] else 1.0
@@ -79,39 +86,45 @@ class ByHand:
 
     @property
     def measured(self) -> int:
-        """The state that the encoder measures."""
+        """Return the index of the state that the encoder measures."""
         return XP if self.numbers[NAMES.index("at_motor")] else X
 
     @property
     def stiffness(self) -> float:
-        """Proportional stiffness of the loop [N/m]."""
+        """Return the proportional stiffness of the loop [N/m]."""
         return float(self.numbers[NAMES.index("kp")])
 
     @property
     def omega(self) -> float:
-        """Natural frequency of mass and loop [1/s]."""
+        """Return the natural frequency of mass and loop [1/s]."""
         n = dict(zip(NAMES, self.numbers, strict=True))
         return float(np.sqrt(n["kp"] / (n["cart"] + n["stage"] + n["part"] + n["motor"])))
 
     @property
     def length(self) -> float:
-        """By how much the break-away force deflects the loop [m]; without friction as much as the bias, or 1 mm."""
+        """Return the deflection of the loop by the break-away force [m].
+
+        Without friction it is the deflection by the bias, or 1 mm.
+        """
         n = dict(zip(NAMES, self.numbers, strict=True))
         force = n["static"] or abs(n["bias_cart"]) + abs(n["bias_stage"])
         return float(force / n["kp"]) or 1e-3
 
     @property
     def wait(self) -> float:
-        """Time [s] in which the integrator winds up to the break-away force while the stage sticks at `length`."""
+        """Return the time [s] in which the integrator winds up to break-away, for a stage stuck at `length`."""
         n = dict(zip(NAMES, self.numbers, strict=True))
         return float(n["kp"] / n["ki"]) if n["ki"] else np.inf
 
     def held(self) -> ByHand:
-        """The same stage, its reference at 0 for ever."""
+        """Return the same stage with its reference at 0 for ever."""
         return ByHand(self.numbers, np.zeros((1, 4)))
 
     def start(self, displacement: float = 0.0) -> np.ndarray:
-        """Everything at rest, displaced [m]; a filter of the position has followed, one of the error has not."""
+        """Return a start at rest with a displacement [m].
+
+        A filter of the position has followed it, a filter of the error has not.
+        """
         y = np.zeros(len(STATES))
         y[[X, XC, XP]] = displacement
         n = dict(zip(NAMES, self.numbers, strict=True))
@@ -119,7 +132,10 @@ class ByHand:
         return y
 
     def run(self, y: np.ndarray, times: np.ndarray, rtol: float = 1e-9, most: int = 4_000_000) -> np.ndarray:
-        """States at the times [s], shape (times, states), from `y` at the first; NaN behind where it does not go on."""
+        """Return states at the times [s], shape (times, states), from `y` at the first time.
+
+        They are NaN after a failure.
+        """
         out = np.full((len(times), len(STATES)), np.nan)
         edges = [*self.pieces[1:, 0], np.inf]
         left = most
@@ -152,7 +168,7 @@ class ByHand:
 
 
 def by_hand(flat: Mapping[str, Any]) -> ByHand:
-    """The equations of a stage given as flat keys to SI numbers. Raises NotWritten."""
+    """Return the equations of a stage given as flat keys to SI numbers. Raises NotWritten."""
     law, joint = flat["friction.model"], joint_state(flat)
     if law not in LAWS:
         raise NotWritten(law)
@@ -209,7 +225,7 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
 
 
 def _side(flat: Mapping[str, Any]) -> float:
-    """Where the encoder is: 1 at the motor, 0 at the load."""
+    """Return the side of the encoder: 1 at the motor, 0 at the load."""
     sides = {flat.get(f"encoder.{name}", "load") for name in ("position", "velocity")}
     if len(sides) > 1:
         raise NotWritten("two encoders")
@@ -217,7 +233,7 @@ def _side(flat: Mapping[str, Any]) -> float:
 
 
 def joint_state(flat: Mapping[str, Any]) -> str:
-    """Which of `JOINTS` a stage has."""
+    """Return which of `JOINTS` a stage has."""
     if "joint.limiter_stiffness" not in flat:
         return "rigid"
     if flat["joint.locked"]:
@@ -226,14 +242,14 @@ def joint_state(flat: Mapping[str, Any]) -> str:
 
 
 def _gains(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Those of a PID, or of an observer and its feedback."""
+    """Return the gains of a PID, or of an observer and its feedback."""
     if flat["controller.kind"] == "adrc":
         return _observer(flat)
     return {"observer": 0.0, "feedback": 0.0, "believed": 0.0, **_pid(flat)}
 
 
 def _observer(flat: Mapping[str, Any]) -> dict[str, float]:
-    """The observer and its feedback, and the proportional and the integral gain that they come to."""
+    """Return the observer and its feedback, with the resulting proportional and integral gain."""
     if {"controller.force_limit", "controller.integral_leak", "controller.integral_limit"} & set(flat):
         raise NotWritten("an observer with a limit or a leak")
     feedback, mass = 2 * np.pi * flat["controller.bandwidth"], flat["controller.tuned_mass"]
@@ -247,8 +263,11 @@ def _observer(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _pid(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Van Dijk's rules (Eq. 7, 8) with kp, ki, kd of (s tau_z + 1)(s tau_i + 1) k_p/(s tau_i), multiplied out; or the
-    gains of Eq. 6."""
+    """Return the gains of a PID.
+
+    They are the gains of Eq. 6, or van Dijk's rules (Eq. 7, 8) with kp, ki, kd of (s tau_z + 1)(s tau_i + 1) k_p/(s
+    tau_i), multiplied out.
+    """
     if "controller.crossover" in flat:
         omega, alpha = 2 * np.pi * flat["controller.crossover"], flat["controller.alpha"]
         gain = flat["controller.tuned_mass"] * omega**2 * np.sqrt(alpha)
@@ -371,7 +390,7 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _jacobian(time, y, piece, n, size):  # type: ignore[no-untyped-def]
-    """By differences to the side on which the state is."""
+    """Return the Jacobian by differences to the side on which each state is."""
     base = _rate(time, y, piece, n)
     out = np.zeros((10, 10))
     for k in range(10):

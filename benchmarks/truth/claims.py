@@ -1,4 +1,4 @@
-"""What `friso check` says of a stage, as far as it can be refuted."""
+"""Collect what `friso check` says about a stage, as far as it can be refuted."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ from friso.stage import Stage
 ATTRACTED = ("hunts", "bistable")
 
 RUNS_AWAY = "runs away"
-"""What is said of a stage, its loop being unstable, of which there is no verdict."""
+"""Word for a stage whose loop is unstable, on which there is no verdict."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """The edge of hunting as a factor of the stage's bandwidth, whether it is sure, and up to what share of it; one
-    that is not sure lies between that factor, up to which hunting was found, and `quiet`, at which none was found. The
-    `windows` beside it, in which hunting is said to be possible, go from where none was found to where none was."""
+    """The edge of hunting as a factor of the stage's bandwidth.
+
+    It says whether it is sure, and its relative error. If it is not sure, it lies between that factor, up to which
+    hunting was found, and `quiet`, at which none was found. The other `windows` of hunting run between two factors at
+    which none was found.
+    """
 
     factor: float
     sure: bool
@@ -34,16 +37,18 @@ class Edge:
 
     @property
     def beyond(self) -> float:
-        """The factor above which nothing may attract, for all that is said."""
+        """Return the factor above which, by the claim, nothing may attract."""
         return self.factor * (1 + self.reserve) if self.sure else self.quiet
 
 
 @dataclass(frozen=True)
 class Claim:
-    """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named), the
-    displacements that are said to start hunting (None: nothing was said), what attracts, as it was surveyed (None: it
-    was not), why the verdict and the edge are not sure, `doubts`, by "verdict" and "edge", and the margin in static
-    friction (None: none was named)."""
+    """The verdict on one case of a stage.
+
+    It says whether it is sure, the edge of hunting (None: none was stated), the displacements that start hunting (None:
+    nothing was said), the survey of attractors (None: no survey), and the margin in static friction (None: none was
+    stated). `doubts` says why verdict and edge are not sure, by "verdict" and "edge".
+    """
 
     case: str
     stage: Stage
@@ -61,12 +66,12 @@ class Claim:
 
     @property
     def motions(self) -> tuple[Swinging, ...]:
-        """What is said to attract."""
+        """Return the motions that are said to attract."""
         return self.surveyed.motions if self.surveyed else ()
 
     @property
     def swing(self) -> float:
-        """Half of peak to peak of the least of what attracts [m]; infinite where nothing does."""
+        """Return half of peak to peak [m] of the least attractor; infinite without one."""
         return least_swing(self.motions)
 
     def __str__(self) -> str:
@@ -78,8 +83,10 @@ class Claim:
 
 @dataclass(frozen=True)
 class Checked:
-    """The claims on a stage, the CPU time [s] that the check took once its kernels were there, and its `work` (see
-    `friso.engine.allowance`)."""
+    """The claims on a stage, the CPU time [s] of the check with kernels present, and its `work`.
+
+    For work see `friso.engine.allowance`.
+    """
 
     claims: tuple[Claim, ...]
     cpu: float
@@ -87,7 +94,7 @@ class Checked:
 
 
 def checked(stage: Stage) -> Checked:
-    """What a check of the stage says; cases that are one and the same stage once."""
+    """Check a stage; equal cases count once."""
     kernels(needed_kernels(stage))
     start = time.process_time()
     with allowance() as spent:
@@ -100,7 +107,7 @@ def checked(stage: Stage) -> Checked:
 
 
 def least_swing(motions: Iterable[Swinging]) -> float:
-    """Half of peak to peak of the least of some motions [m]; infinite without any."""
+    """Return half of peak to peak [m] of the least of some motions; infinite without any."""
     return min((motion.amplitude for motion in motions), default=np.inf)
 
 

@@ -1,5 +1,7 @@
-"""Classes of machines, by which attacks are counted: a stage belongs to one law, one joint and one controller, and to
-as many of the others as it has."""
+"""Define classes of machines, by which attacks are counted.
+
+A stage belongs to one law, one joint and one controller, and to each further class that fits.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,11 @@ BY_KEY = {
     f"{TRANSMISSION}.stiffness": "transmission",
     BACKLASH: "backlash",
 }
-"""Classes of the stages that have a key other than 0."""
+"""Classes of stages that have a key other than 0, by the key."""
 
 
 def classes_of(flat: Mapping[str, Any]) -> list[str]:
-    """The classes of a stage given as flat keys, in alphabetical order."""
+    """Return the classes of a stage given as flat keys, in alphabetical order."""
     return sorted({*_by_structure(flat), *(name for key, name in BY_KEY.items() if flat.get(key))})
 
 

@@ -1,7 +1,7 @@
-"""Stages drawn at random: all structures, laws and controllers, log-uniform over what bearings and stages can be.
+"""Draw stages at random: all structures, laws and controllers, log-uniform over realistic ranges.
 
-The stage with a number is the same whatever is drawn beside it. Structures come from a pool, each of whose members is a
-kernel to compile: numbers that differ by the size of the pool share one.
+A numbered stage does not depend on what else is drawn. Structures come from a pool, each of whose members is a kernel
+to compile: numbers that differ by the size of the pool share one.
 """
 
 from __future__ import annotations
@@ -19,21 +19,29 @@ from friso.stage.tables import FRICTION
 
 GRAVITY = 9.81
 SPREAD = 3.0
-"""Factor about its example within which a key that is not known here is drawn."""
+"""Factor around its example within which an unfamiliar key is drawn."""
 
 
 ELEMENTS = 4
-"""Maxwell-slip elements; their number decides on the structure."""
+"""Number of Maxwell-slip elements, which decides on the structure."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
-    with their derivative "on error", or on the measurement, "filtered" or "plain"; `windup`: what the
-    integrator does where the force is limited; `bias`: the mass it acts on; `deadband`: of the error; `drive`: a
-    "transmission", with a "backlash" or none, and where the encoder is; `motor`: the law of the friction at the motor;
-    `filtered`: a notch and a low-pass filter; `setting`: one against friction; `axis`: of a size that axes of machines
-    have."""
+    """Choices that decide on the structure of a stage.
+
+    - `exponent`: None stands for any number.
+    - `control`: "rules" of van Dijk, or gains with their derivative "on error", or on the measurement, "filtered" or
+      "plain".
+    - `windup`: what the integrator does at the force limit.
+    - `bias`: the mass on which it acts.
+    - `deadband`: of the error.
+    - `drive`: a "transmission", with a "backlash" or none, and the side of the encoder.
+    - `motor`: law of the friction at the motor.
+    - `filtered`: a notch and a low-pass filter.
+    - `setting`: one against friction.
+    - `axis`: of the size of machine axes.
+    """
 
     joint: str
     friction: str = "lugre"
@@ -83,7 +91,7 @@ FORMS = (
     Form("rigid", "rolling"),
     Form("free", "rolling"),
 )
-"""Structures, as many as there are kernels to compile, with every friction law that comes with friso."""
+"""Structures, one for each kernel to compile, with every friction law that comes with friso."""
 
 
 MACHINES = (
@@ -96,7 +104,7 @@ MACHINES = (
     Form("rigid", drive="backlash at the motor"),
     Form("free", control="filtered", deadband=True),
 )
-"""Structures of machines: cascades with filters, screws and belts, deadbands. A series of their own."""
+"""Structures of machines, a separate series: cascades with filters, screws and belts, deadbands."""
 
 AXES = tuple(
     replace(form, axis=True)
@@ -127,13 +135,13 @@ DRIVES = (
     Form("rigid", "none", control="filtered", drive="transmission at the load", motor="lugre", axis=True),
     Form("rigid", "dahl", control="filtered", drive="backlash at the motor", motor="stribeck", axis=True),
 )
-"""Axes with friction at the motor, beside that of the guide or alone."""
+"""Axes with friction at the motor, in addition to that of the guide or alone."""
 
 SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES, "drives": DRIVES}
 
 
 def draw(seed: int, number: int, series: str = "stages") -> Stage:
-    """The stage with this number of a series that begins with `seed`."""
+    """Return the numbered stage of a series that begins with `seed`."""
     forms = SERIES[series]
     tables = _Draw(np.random.default_rng([seed, number]), forms[number % len(forms)]).tables()
     kind = "" if forms is FORMS else f", {series}"
@@ -158,7 +166,7 @@ class _Draw:
         self.alpha, self.beta = self.log(0.03, 0.4), self.log(1.3, 8.0)
 
     def log(self, low: float, high: float) -> float:
-        """Log-uniform between two numbers."""
+        """Draw a number log-uniformly between two numbers."""
         return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
 
     def sign(self) -> float:
@@ -166,12 +174,12 @@ class _Draw:
 
     @property
     def stiffness(self) -> float:
-        """About the proportional stiffness of the loop [N/m]."""
+        """Return roughly the proportional stiffness of the loop [N/m]."""
         return self.mass * self.omega**2 * np.sqrt(self.alpha)
 
     @property
     def deflection(self) -> float:
-        """By how much friction deflects the loop [m]."""
+        """Return the deflection of the loop by friction [m]."""
         return self.static / self.stiffness
 
     def tables(self) -> dict[str, Any]:
@@ -197,7 +205,10 @@ class _Draw:
         return tables | {"motion": self.motion()}
 
     def friction(self, model: str, static: float) -> dict[str, Any]:
-        """Friction that breaks away at a force [N]: known keys from what bearings are like, others about examples."""
+        """Draw friction that breaks away at a force [N].
+
+        Familiar keys are realistic for bearings, others lie around their examples.
+        """
         law = FRICTION.classes[model]
         bristles = static / self.log(2e-7, 1e-4)
         coulomb = static * self.rng.uniform(0.2, 1.0)
@@ -229,7 +240,10 @@ class _Draw:
         return table
 
     def elements(self, stiffness: float) -> dict[str, Any]:
-        """Maxwell-slip elements that yield one after the other, and stick by a stiffness [N/m] together."""
+        """Draw Maxwell-slip elements that yield one after the other.
+
+        While sticking, their stiffness [N/m] adds up to the given one.
+        """
         shares = self.rng.dirichlet(np.full(ELEMENTS, 2.0))
         shares[-1] += 1 - float(np.sum(shares))
         parts = np.geomspace(1.0, self.log(0.01, 0.5), ELEMENTS) * shares
@@ -242,14 +256,14 @@ class _Draw:
         }
 
     def about(self, field: Any) -> Any:
-        """A value about the example of a key."""
+        """Draw a value around the example of a key."""
         if isinstance(field, Quantity):
             number, unit = field.example.strip('"').split(maxsplit=1)
             return _text(float(number) * self.log(1 / SPREAD, SPREAD), unit)
         return float(field.example) * self.log(1 / SPREAD, 1.0)
 
     def drive(self) -> dict[str, Any]:
-        """A motor behind a screw or belt, whose mode with the masses lies above the crossover."""
+        """Draw a motor behind a screw or belt, whose mode with the masses lies above the crossover."""
         kind, side = self.form.drive.split(" at the ")
         motor = self.mass * self.log(0.1, 5.0)
         reduced = motor * self.mass / (motor + self.mass)
@@ -264,7 +278,7 @@ class _Draw:
         return {"transmission": table, "encoder": {"position": side, "velocity": side}}
 
     def cascade(self) -> dict[str, Any]:
-        """A velocity loop, its integral as slow as a few of its own times, and a slower position loop."""
+        """Draw a velocity loop, with an integral as slow as a few of its own times, and a slower position loop."""
         return {
             "kind": "cascade",
             "kv": _text(self.omega * self.log(0.1, 0.6), "1/s"),
@@ -274,7 +288,7 @@ class _Draw:
         }
 
     def filters(self) -> list[dict[str, Any]]:
-        """A notch on the force, and a low-pass filter in the feedback, both above the crossover."""
+        """Draw a notch on the force, and a low-pass filter in the feedback, both above the crossover."""
         notch, low_pass = (max(self.crossover * self.log(6.0, 40.0), 50.0) for _ in range(2))
         return [
             {"kind": "notch", "frequency": _text(notch, "Hz"), "width": _text(0.4 * notch, "Hz"), "depth": 0.9},
@@ -317,10 +331,10 @@ class _Draw:
             table["error_deadband"] = _text(self.deflection * self.log(1e-4, 0.3), "m")
         if self.form.windup == "back_calculation":
             table["anti_windup_time"] = _text(self.log(0.1, 10.0) / self.omega, "s")
-        return table | self.setting() if self.form.axis else table  # others are drawn as before there were any
+        return table | self.setting() if self.form.axis else table  # others are drawn as before settings existed
 
     def setting(self) -> dict[str, Any]:
-        """One of the settings of drives against friction."""
+        """Draw one of the settings of drives against friction."""
         error, force = self.deflection * self.log(1e-3, 1.0), self.static * self.log(0.05, 3.0)
         settings: dict[str, dict[str, Any]] = {
             "": {},
@@ -352,7 +366,7 @@ class _Draw:
         }
 
     def motion(self) -> dict[str, Any]:
-        """A move of every kind, from a share of the deflection by friction to a thousand of them."""
+        """Draw a move of any kind, from a fraction of the deflection by friction to a thousand of it."""
         kind = str(
             self.rng.choice(["there_and_back", "release", "step", "hold", "ramp"], p=[0.5, 0.18, 0.14, 0.12, 0.06])
         )

@@ -1,4 +1,4 @@
-"""Attacks kept in a file, a line of JSON each, so that many stages can be attacked in several goes."""
+"""Keep attacks in a file, a line of JSON each, so that many stages can be attacked in several runs."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from typing import Any
 from benchmarks.code_digest import code_digest
 
 CHECKED = ("stage", "equations", "engine", "hunting")
-"""Folders of friso on which the answers of a check rest."""
+"""Folders of friso that determine the answers of a check."""
 
 ATTACKING = ("attack", "by_hand", "claims", "draws", "refute", "second_opinion", "swings", "trials")
-"""Modules of this adversary on which its own rest."""
+"""Modules of this adversary that determine its own answers."""
 
 Record = dict[str, Any]
 Key = tuple[str, int, int]
@@ -26,15 +26,21 @@ Key = tuple[str, int, int]
 
 @cache
 def code_version() -> str:
-    """What attacks were made with: digests of friso's code and of the adversary's, comments and words left out."""
+    """Return the code version of attacks: digests of friso's code and of the adversary's.
+
+    Comments and words are left out.
+    """
     own = [str(Path(__file__).with_name(f"{name}.py")) for name in ATTACKING]
     return f"{code_digest(CHECKED)}-{code_digest(own)}"
 
 
 @dataclass
 class KeptAttacks:
-    """The attacks in a file, one for each stage: the last by the code as it is now, or else by any other. Lines that
-    cannot be read are left as they are, and `damaged` holds their numbers."""
+    """The attacks in a file, one for each stage.
+
+    It is the last attack by the present code, or else by any other. Unreadable lines stay, and `damaged` holds their
+    numbers.
+    """
 
     file: Path
     records: dict[Key, Record] = field(default_factory=dict)
@@ -54,23 +60,23 @@ class KeptAttacks:
             self.records[key] = record
 
     def add(self, record: Record) -> Record:
-        """Append an attack to the file, on the disk when this returns; with the code version and the day."""
+        """Append an attack to the file, with the code version and the day; it is on disk when this returns."""
         record = record | {"code": code_version(), "day": date.today().isoformat()}
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("ab+", buffering=0) as stream:
             stream.seek(max(stream.seek(0, os.SEEK_END) - 1, 0))
-            end = b"\n" if stream.read(1) not in (b"", b"\n") else b""  # of a line that was cut off
+            end = b"\n" if stream.read(1) not in (b"", b"\n") else b""  # after a line that was cut off
             stream.write(end + json.dumps(record).encode() + b"\n")
             os.fsync(stream.fileno())
         self._take(record)
         return record
 
     def of(self, series: str, seed: int, numbers: Iterable[int]) -> list[Record]:
-        """The attacks on stages with some numbers."""
+        """Return the attacks on numbered stages."""
         keys = [(series, seed, number) for number in numbers]
         return [self.records[key] for key in keys if key in self.records]
 
 
 def is_current(record: Record) -> bool:
-    """Whether an attack was made with the code as it is now."""
+    """Tell whether an attack was made with the present code."""
     return record["code"] == code_version()

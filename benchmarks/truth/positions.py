@@ -1,4 +1,7 @@
-"""`friso simulate` against SciPy with the equations by hand: positions of drawn stages over their whole motion."""
+"""Compare `friso simulate` with SciPy: positions of drawn stages over their whole motion.
+
+SciPy solves the equations written by hand.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from friso.engine.simulate import RTOL
 from friso.stage import Stage
 
 WITHIN = 1e-2
-"""Share of the deflection of the loop by the break-away force by which positions may differ."""
+"""Largest difference of positions, over the deflection of the loop by the break-away force."""
 
 FINER, FINEST = 1e-10, 1e-11
 SAMPLES = 4000
@@ -23,8 +26,11 @@ SAMPLES = 4000
 
 @np.errstate(all="ignore")
 def compared(seed: int, number: int, series: str = "stages") -> dict[str, Any]:
-    """How far the default run of a drawn stage (rtol 1e-9) is from SciPy at 1e-9, in units of that deflection; of those
-    that are too far, also how far the two are from themselves at finer tolerances, and from each other there."""
+    """Return how far friso's default run of a drawn stage (rtol 1e-9) is from SciPy at 1e-9.
+
+    Distances are in deflections of the loop by the break-away force. If they are too large, both methods are also
+    compared with themselves at finer tolerances, and with each other there.
+    """
     stage = draw(seed, number, series)
     equations = by_hand(stage.flat())
     unit = equations.length
@@ -57,7 +63,7 @@ def _friso(stage: Stage, rtol: float, count: int) -> tuple[str, np.ndarray]:
 
 
 def summary(records: list[dict[str, Any]]) -> None:
-    """Print how many are within reach, and those that are not."""
+    """Print how many stages agree, and list the others."""
     far = [record for record in records if not record["off"] < WITHIN]
     if far:
         print("\nToo far: largest difference / deflection by the break-away force; first time [s] it is too large")

@@ -1,8 +1,8 @@
-"""Attempts to refute what was claimed of a stage.
+"""Try to refute what was claimed about a stage.
 
-Before a claim is called wrong the attack closes in, one way or the other: what swings on and should not has to attract
-its neighbours (`attracts`), and where nothing swings on that should, starts close beside what is said to attract must
-not either (`may_attract`), at two tolerances.
+Before a claim is called wrong the attack looks closer. A swing that should not exist must attract its neighbours
+(`attracts`). If nothing keeps swinging although it should, starts close to the claimed attractor must not either
+(`may_attract`), at two tolerances.
 """
 
 from __future__ import annotations
@@ -22,45 +22,44 @@ from friso.equations.scaled_friction import with_static_friction
 from friso.hunting import Kick, ParameterMargin, Swinging, find_swings
 
 ALL = (80, 40, 60, 20)
-"""Releases, pushes, stuck and drawn starts of a whole battery."""
+"""Numbers of releases, pushes, stuck and drawn starts of a whole battery."""
 
 FEW = (16, 8, 32, 8)
-"""The same at a crossover beside an edge."""
+"""Numbers of starts of each kind at a crossover beside an edge."""
 
 SECOND = 24
-"""Starts of a battery that are followed at the finer tolerance too."""
+"""Starts of a battery that are also followed at the finer tolerance."""
 
 TRIED, APART = 3, 1e-3
-"""Starts of those that swing on which are looked at closely, and the share by which their amplitudes differ: others
-are in the same swing."""
+"""Number of swinging starts that are examined closely, and the relative difference of their amplitudes: closer ones are
+the same swing."""
 
 CONSTANTS = 10.0
-"""Time constants of what is said to attract for which its neighbours are followed: if it repels by half of what it is
-said to attract by, they leave in that time."""
+"""Time for which neighbours of a claimed attractor are followed, in its time constants. If it repels by half of the
+claimed attraction, they leave in that time."""
 
 POSSIBLE = (SWINGS, UNSURE, FAILED)
-"""What is seen of neighbours of a motion that attracts, for all that is known."""
+"""Outcomes of neighbours that are consistent with an attractor."""
 
 NEITHER = "from 0.1 to 1 % beside what is said to attract"
 
 ABOVE = (1.002, 1.005, 1.01, 1.1, 1.6)
-"""Factors above the edge at which nothing may attract; those within the range that the edge itself is known to are left
-out."""
+"""Factors above the edge at which nothing may attract. Those within the error of the edge are left out."""
 
 BELOW, NEAREST = (0.995, 0.98, 0.95), 0.999
-"""Factors below it; at one of them at least something must, or at the nearest one, where all that friso's own survey
-finds there is tried."""
+"""Factors below the edge. Something must attract at one of them, or at the nearest one, where all that friso's own
+survey finds is tried."""
 
 JUST, DENSE = 1.01, 1 + 0.06 * np.linspace(-1, 1, 24)
-"""Factors up to which stages just beyond an edge are also begun from swings just below it, made larger and smaller by
-so much: beyond a flip or a fold something may attract from a narrow range there."""
+"""Factors up to which stages just beyond an edge are also started from swings just below it, made larger and smaller by
+these factors. Beyond a flip or a fold something may attract from a narrow range there."""
 
 KICKS, BROAD = 60, np.array([1 / 1.04, 1.0, 1.04])
-"""Displacements that are tried, and factors of each that all have to show the contrary of what is said: windows
-narrower than 7 % may be missed (docs/hunting.md)."""
+"""Number of displacements tried, and factors of each that must all contradict the claim: windows narrower than 7 % may
+be missed (docs/hunting.md)."""
 
 SCIPY_PERIODS, ALIKE = 20.0, 0.03
-"""Periods for which SciPy follows a swing, and the share by which its amplitude may differ."""
+"""Periods for which SciPy follows a swing, and the largest relative difference of its amplitude."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +73,16 @@ class Refutation:
 
 
 def attempts(claim: Claim, seed: int) -> dict[str, Iterator[Refutation]]:
-    """What is tried against a claim: attempts to refute its "verdict", and its "edge" and its margin in "static
-    friction", as far as there are any."""
+    """Return the attempts against a claim: on its "verdict", its "edge" and its margin in "static friction".
+
+    Only what the claim states is attempted.
+    """
     bench, tried = Bench(claim.stage.flat(), claim.swing), dict[str, Iterator[Refutation]]()
     if claim.verdict == "failed" or not bench.length > 0:
         return tried
     if claim.verdict == RUNS_AWAY:
         tried["verdict"] = _away(claim, bench)
-    elif bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
+    elif bench.flat["motion.kind"] != "ramp":  # the reference never stands still
         tried["verdict"] = _hunting(claim, bench, seed)
     if claim.edge is not None:
         tried["edge"] = _edge(claim, claim.edge, seed)
@@ -91,7 +92,7 @@ def attempts(claim: Claim, seed: int) -> dict[str, Iterator[Refutation]]:
 
 
 def _hunting(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
-    """Whether something attracts, the stage's own motion ends in it, and displacements do."""
+    """Test whether something attracts, the stage's own motion ends in it, and displacements do."""
     yield from _verdict(claim, bench, seed)
     yield from _own_motion(claim, bench)
     if claim.kick is not None and not claim.kick.unknown:
@@ -99,7 +100,7 @@ def _hunting(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 
 
 def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
-    """Whether something attracts."""
+    """Test whether something attracts."""
     trial = bench.starts(*ALL, seed)
     if claim.attracted:
         windows = claim.kick.windows if claim.kick else ()
@@ -113,15 +114,17 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 
 
 def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool:
-    """Whether any start swings on, or might: the kicks that are said to, then all of the trial."""
+    """Tell whether any start keeps swinging, or may: first the claimed kicks, then the whole trial."""
     trials = (bench.released(np.array(kicks)), trial) if kicks else (trial,)
     runs = (bench.follow(begun, rtol) for rtol in (ROUGH, FINE) for begun in trials)
     return any(np.isin(run.words.astype(str), (SWINGS, UNSURE)).any() for run in runs)
 
 
 def swinging(bench: Bench, trial: Trial) -> str:
-    """From which start, and how, a stage swings on, as its neighbours do; "" where it does not. SciPy says what it
-    makes of it."""
+    """Return from which start, and how, a stage keeps swinging, as its neighbours do; "" if it does not.
+
+    The text includes SciPy's answer.
+    """
     few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
     for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
         run = bench.follow(begun, rtol)
@@ -135,20 +138,25 @@ def swinging(bench: Bench, trial: Trial) -> str:
 
 
 def _different(run: Outcome) -> np.ndarray:
-    """A few of the runs that swing on, each by another amplitude."""
+    """Return a few of the swinging runs, with different amplitudes."""
     _, first = np.unique(np.round(np.log(run.amplitude[run.swinging]) / APART), return_index=True)
     return run.swinging[np.sort(first)][:: max(1, len(first) // TRIED)][:TRIED]
 
 
 def attracts(bench: Bench, end: np.ndarray, period: float) -> bool:
-    """Whether neighbours of a state that a run ended in, which swung for long with a period [s], swing on too, for very
-    long: before it is said that something attracts that should not."""
+    """Tell whether neighbours of a state on a long swing keep swinging for very long.
+
+    The swing has a period [s]. This is asked before an attractor is asserted that should not exist.
+    """
     return bench.sustains(lambda factors: bench.beside(end, factors), LINGERING * period, (SWINGS,))
 
 
 def may_attract(bench: Bench, motion: Swinging) -> bool:
-    """Whether starts beside a motion that is said to attract swing on, or might, for as long as its multiplier takes to
-    show: before it is said that nothing attracts. They begin about its orbit, and stuck about its distance."""
+    """Tell whether starts beside a claimed attractor keep swinging, or may.
+
+    They are followed for as long as its multiplier takes to show, before it is asserted that nothing attracts. They
+    begin around its orbit, and stuck around its distance.
+    """
     lasting = np.fmin(CONSTANTS * motion.time_constant, LINGERING * motion.period)
     time = max(lasting, ROUNDS[0] * motion.period)
     state = motion.seen if motion.cycles is None else motion.cycles.states[motion.number]
@@ -158,7 +166,7 @@ def may_attract(bench: Bench, motion: Swinging) -> bool:
 
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
-    """What the equations by hand say of a swing [m] that a run ended in."""
+    """Return what the equations by hand say about a swing [m] in which a run ended."""
     try:
         equations = by_hand(bench.flat).held()
     except NotWritten as missing:
@@ -198,7 +206,7 @@ _PLACES = {
 
 
 def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
-    """Whether the stage's own motion can be followed for long although it is said to leave its reference for good."""
+    """Test whether the stage's own motion can be followed for long although it is said to diverge."""
     words = {rtol: str(bench.follow_own(rtol).words[0]) for rtol in (ROUGH, FINE)}
     if any(word != FAILED for word in words.values()):
         why = ", ".join(f"{word} at {rtol:g}" for rtol, word in words.items())
@@ -206,7 +214,7 @@ def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 
 
 def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
-    """Whether the stage's own motion ends as it is said to."""
+    """Test whether the stage's own motion ends as claimed."""
     hunts = claim.verdict == "hunts"
     runs = [bench.follow_own(rtol) for rtol in (ROUGH, FINE)]
     if any(run.words[0] != (RESTS if hunts else SWINGS) for run in runs):
@@ -217,12 +225,12 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 
 
 def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
-    """Whether displacements start hunting where they are said to, and nowhere else."""
+    """Test whether displacements start hunting where claimed, and nowhere else."""
     tried = np.geomspace(*kick.searched, KICKS + 2)[1:-1, None] * BROAD
     said = np.zeros(tried.shape, bool)
     for low, high in kick.windows:
         said |= (low <= tried) & (tried <= high)
-    broad = (said == said[:, :1]).all(axis=1)  # no end of a window among the three
+    broad = (said == said[:, :1]).all(axis=1)  # none of the three is an end of a window
     tried, said = tried[broad], said[broad, 0]
     for rtol in (ROUGH, FINE):
         run = bench.follow(bench.released(tried.ravel()), rtol, any_will_do=False)
@@ -237,7 +245,7 @@ def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
 
 
 def _edge(claim: Claim, edge: Edge, seed: int) -> Iterator[Refutation]:
-    """Whether nothing attracts on the far side of the edge, but in the windows told, and something on the near side."""
+    """Test that nothing attracts beyond the edge, except in stated windows, and something does before it."""
     end, nearest = edge.factor, edge.beyond / edge.factor
     benches = [Bench(at(claim, end * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)
@@ -261,8 +269,10 @@ def _edge(claim: Claim, edge: Edge, seed: int) -> Iterator[Refutation]:
 
 
 def _static_friction(claim: Claim, margin: ParameterMargin, seed: int) -> Iterator[Refutation]:
-    """Whether the stage hunts, or not, at both factors of static friction between which that is said to change, and at
-    the ends of the range where no change is named."""
+    """Yield factors of static friction at which the stage hunts though it is said not to, or the reverse.
+
+    Both ends of a stated change are tried, and the ends of the range where none is stated.
+    """
     said = {
         factor: (attracts, claim.sure and end.certain)
         for end in (margin.below, margin.above)
@@ -281,14 +291,14 @@ def _static_friction(claim: Claim, margin: ParameterMargin, seed: int) -> Iterat
 
 
 def _may_attract_at(flat: dict[str, Any]) -> bool:
-    """Whether what friso itself finds of a stage, given as flat keys, attracts."""
+    """Tell whether what friso itself finds for a stage, given as flat keys, attracts."""
     motions = find_swings(flat)
     bench = Bench(flat, least_swing(motions))
     return any(may_attract(bench, motion) for motion in motions)
 
 
 def _swings(bench: Bench, seed: int) -> np.ndarray:
-    """States in swings that go on, a few of them, made larger and smaller, (starts, states)."""
+    """Return states on lasting swings, a few of them, made larger and smaller, (starts, states)."""
     run = bench.follow(bench.starts(*FEW, seed), ROUGH)
     chosen = _different(run)
     if not chosen.size:
@@ -297,7 +307,7 @@ def _swings(bench: Bench, seed: int) -> np.ndarray:
 
 
 def at(claim: Claim, factor: float) -> dict[str, Any]:
-    """The stage as flat keys, its controller faster by a factor."""
+    """Return the stage as flat keys with its controller faster by a factor."""
     return faster(claim.stage.flat(), factor)
 
 

@@ -1,4 +1,4 @@
-"""Verdicts against SciPy alone, with the equations by hand: the stage's own motion and some releases."""
+"""Test verdicts by SciPy alone, with the equations by hand: the stage's own motion and some releases."""
 
 from __future__ import annotations
 
@@ -14,21 +14,24 @@ from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.trials import SMALL
 
 RELEASES = (0.3, 1.5, 20.0)
-"""Displacements in units of the deflection by the break-away force."""
+"""Displacements in deflections by the break-away force."""
 
 PERIODS, SAMPLES = 40.0, 8000
-"""Periods for which is followed, and samples in which turning points are sought."""
+"""Periods for which runs are followed, and samples in which turning points are sought."""
 
 TWICE = 1e-9, 1e-11
-"""The two relative tolerances at which it has to show what it has against a verdict."""
+"""The two relative tolerances at which a refutation has to hold."""
 
 LONGER = 10.0
-"""How many times as long one is followed on that swings then: it may be on its way to rest for hundreds of periods."""
+"""Factor on the time of a run that still swings, because it may be coming to rest for hundreds of periods."""
 
 
 def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
-    """What SciPy has against a verdict: a swing that lasts where nothing is said to attract, or rest where the stage's
-    own motion is said to hunt."""
+    """Yield SciPy's refutations of a verdict.
+
+    They are a lasting swing although nothing is said to attract, or rest although the stage's own motion is said to
+    hunt.
+    """
     flat = claim.stage.flat()
     try:
         equations = by_hand(flat)
@@ -51,12 +54,12 @@ def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
 
 
 def ends_so(equations: ByHand, start: np.ndarray, word: str) -> bool:
-    """Whether a word of `swings` tells what becomes of a stage from a state, at both tolerances."""
+    """Tell whether a word of `swings` describes what becomes of a stage from a state, at both tolerances."""
     return all(followed(equations, start, rtol) == word for rtol in TWICE)
 
 
 def followed(equations: ByHand, start: np.ndarray, rtol: float) -> str:
-    """What becomes of a stage from a state; a word of `swings`."""
+    """Return what becomes of a stage from a state, as a word of `swings`."""
     corner = float(equations.pieces[-1, 0])
     period = 2 * (3 * equations.wait + 2 * np.pi / equations.omega)
     times = corner + np.linspace(0.0, PERIODS * period, SAMPLES)
@@ -74,7 +77,7 @@ def followed(equations: ByHand, start: np.ndarray, rtol: float) -> str:
 
 
 def _word(equations: ByHand, run: np.ndarray, times: np.ndarray) -> str:
-    """What became of states (times, states) at times from 0 on [s]."""
+    """Return what became of states (times, states) at times from 0 on [s]."""
     x = run[:, 0] - equations.pieces[-1, 1]
     if not np.isfinite(x[-1]):
         return UNSURE
@@ -85,7 +88,7 @@ def _word(equations: ByHand, run: np.ndarray, times: np.ndarray) -> str:
 
 
 def _turns(x: np.ndarray, least: float) -> np.ndarray:
-    """Numbers of the turning points of a zigzag whose legs are at least so long."""
+    """Return the numbers of the turning points of a zigzag with legs of at least `least`."""
     kept = [0]
     for k in range(1, len(x) - 1):
         turns = (x[k] - x[k - 1]) * (x[k + 1] - x[k]) <= 0 and x[k] != x[k - 1]

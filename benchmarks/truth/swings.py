@@ -1,9 +1,9 @@
-"""Whether a run swings on for ever, from its turning points alone: this adversary's own criterion.
+"""Decide whether a run swings for ever, from its turning points alone.
 
-A stage that sticks winds up the longer the nearer it is to its reference, so that a swing that shrinks by a fixed
-share every time shrinks in time as 1/t, and looks almost steady; a cycle near its edge takes hundreds of swings to
-leave or to be reached. So legs are compared with legs, of the last quarter with those of the quarter before, and where
-that does not tell the run is followed longer.
+This criterion is the adversary's own. A stage that sticks winds up the longer the nearer it is to its reference, so
+that a swing that shrinks by a fixed fraction every time shrinks in time as 1/t, and looks almost steady. A cycle near
+its edge takes hundreds of swings to leave or to reach. So legs of the last quarter are compared with legs of the
+quarter before, and if that does not decide, the run is followed longer.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 RESTS, SWINGS, UNSURE, FAILED = "rests", "swings", "unsure", "failed"
 
 STEADY = 1e-3
-"""Share by which the largest leg of a quarter may differ from that of the one before where a run swings on."""
+"""Largest relative difference between the largest legs of successive quarters of a lasting swing."""
 
 LASTING, LEGS = 0.95, 6
-"""The same where it was followed to the end of patience (chaotic swings vary; one that decays is far below by then),
-and the legs in the last quarter that a swing has at least."""
+"""Least ratio of these legs at the end of the longest run (chaotic swings vary; one that decays is far smaller by
+then), and fewest legs of a swing in the last quarter."""
 
 
 @dataclass(frozen=True)
 class Legs:
-    """The largest legs of the third and of the last quarter of a run [m], and the number of large ones in the last."""
+    """The largest legs of the third and of the last quarter of a run [m], and the number of large legs in the last."""
 
     before: float
     last: float
@@ -32,7 +32,10 @@ class Legs:
 
 
 def legs(times: np.ndarray, values: np.ndarray, end: float) -> Legs:
-    """The legs of a zigzag between turning points, `times` [s] and `values` [m], of a run that ended at `end` [s]."""
+    """Return the legs of a zigzag between turning points, `times` [s] and `values` [m].
+
+    The run ended at `end` [s].
+    """
     lengths = np.abs(np.diff(values))
     at = times[1:]
     last, before = at >= 0.75 * end, (at >= 0.5 * end) & (at < 0.75 * end)
@@ -41,8 +44,10 @@ def legs(times: np.ndarray, values: np.ndarray, end: float) -> Legs:
 
 
 def judge(seen: Legs, spread: float, small: float, patient: bool) -> str:
-    """The word for a run whose deviation spreads over so much in its last quarter [m]; less than `small` [m] is none.
-    `patient`: it was followed as long as it will be."""
+    """Return the word for a run from its legs, and from the spread [m] of its deviation in the last quarter.
+
+    A spread below `small` [m] is rest. `patient`: the run will not be followed longer.
+    """
     if spread < small:
         return RESTS
     if seen.count < LEGS or not seen.before:

@@ -1,4 +1,4 @@
-"""What attacks show, counted: of all stages and by class of machine; as data, as text and as a page of Markdown."""
+"""Count what attacks show, for all stages and by class of machine, as data, as text and in Markdown."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from benchmarks.truth.attack import GIVEN_UP, STOOD, WRONG
 from benchmarks.truth.kept import Record, is_current
 
 SLOWEST = 8
-"""Checks that are listed for the work they take."""
+"""Number of checks listed for the work they take."""
 
 Claims = Iterable[tuple[Record, dict[str, Any]]]
-"""What is said of cases, and the attack of which it is part."""
+"""What is said about cases, each with its attack."""
 
 COLUMNS = {
     "stages": "stages",
@@ -32,13 +32,13 @@ COLUMNS = {
     "margins_right": "right",
     "margins_wrong": "wrong",
 }
-"""What is counted, and what it is called. Right is what the attack did not refute; what is certain and neither right
-nor wrong was not attacked to the end: the attack was given up for its work, or there was nothing to try (no friction,
-or a reference that never stands still)."""
+"""What is counted, and its title. "Right" was not refuted. What is certain and neither right nor wrong was not attacked
+to the end: the attack took too much work, or there was nothing to try (no friction, or a reference that never stands
+still)."""
 
 
 def document(records: Sequence[Record]) -> dict[str, Any]:
-    """All that is told of attacks, as data."""
+    """Return all results of attacks as data."""
     claims = _claims(records)
     names = sorted({name for _, claim in claims for name in claim["classes"]})
     by_class = {name: [(r, claim) for r, claim in claims if name in claim["classes"]] for name in names}
@@ -56,7 +56,7 @@ def document(records: Sequence[Record]) -> dict[str, Any]:
 
 
 def counts(claims: Claims) -> dict[str, int]:
-    """What `COLUMNS` name, of some claims."""
+    """Return the counts named in `COLUMNS`, for some claims."""
     claims = list(claims)
     parts = {
         "verdicts": [claim["outcomes"].get("verdict") for _, claim in claims if claim["sure"]],
@@ -76,7 +76,7 @@ def counts(claims: Claims) -> dict[str, int]:
 
 
 def print_tally(records: Sequence[Record], tally: dict[str, Any]) -> None:
-    """Print what attacks show, why what is not certain is not, and the goals."""
+    """Print what attacks show, why some claims are not certain, and the goals."""
     print_table(["", *COLUMNS.values()], _rows(tally))
     for title, names in (
         ("given up for its work", tally["given_up"]),
@@ -106,7 +106,7 @@ def print_tally(records: Sequence[Record], tally: dict[str, Any]) -> None:
 
 
 def page(records: Sequence[Record], tally: dict[str, Any]) -> str:
-    """The tables as a page of Markdown: each series and seed by code version, then all by class of machine."""
+    """Return the tables in Markdown: each series and seed by code version, then all by class of machine."""
     groups: dict[tuple[str, int, str], list[Record]] = {}
     for record in records:
         groups.setdefault((record["series"], record["seed"], record["code"]), []).append(record)
@@ -142,7 +142,7 @@ def _rows(tally: dict[str, Any]) -> list[list[Any]]:
 
 
 def markdown(head: Sequence[Any], rows: Iterable[Sequence[Any]]) -> list[str]:
-    """The lines of a table in Markdown."""
+    """Return the lines of a table in Markdown."""
     return [f"| {' | '.join(map(str, row))} |" for row in (head, ["---"] * len(head), *rows)]
 
 
@@ -164,7 +164,7 @@ def _spread(seconds: Sequence[float]) -> dict[str, float]:
 
 
 def _print_doubts(records: Iterable[Record]) -> None:
-    """Print why what is not certain is not, and of which stages; and which checks take the most work."""
+    """Print why claims are not certain, for which stages, and which checks take the most work."""
     stages: dict[tuple[str, str], list[str]] = {}
     for record, claim in _claims(records):
         for doubt in claim["doubts"].items():

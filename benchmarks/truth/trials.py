@@ -1,4 +1,4 @@
-"""Brute force: a stage started in many ways and followed for long, in the lanes of the engine."""
+"""Simulate by brute force: a stage started in many ways and followed for long, in the engine's lanes."""
 
 from __future__ import annotations
 
@@ -19,42 +19,43 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 
 ROUGH, CLOSER, FINE = 1e-6, 1e-7, 1e-9
-"""Relative tolerances: of many starts, and the two at which the attack closes in on a swing."""
+"""Relative tolerances: for many starts, and the two at which a swing is examined closely."""
 
 DECADES = (1e-4, 1e3)
-"""Releases and pushes in units of the deflection of the loop by the break-away force, and of that times its natural
-frequency."""
+"""Range of releases in deflections of the loop by the break-away force, and of pushes in that deflection times the
+natural frequency."""
 
 LIMITED = 1e6
-"""The largest release of a stage whose force is limited, in the same unit: motions that a limit drives are large."""
+"""Largest release of a stage with a force limit, in deflections of the loop by the break-away force, because motions
+driven by a limit are large."""
 
 NEAR = (0.01, 10.0)
-"""Where stages that stick begin, in the same unit."""
+"""Range in which stuck stages begin, in deflections of the loop by the break-away force."""
 
 SMALL = 2e-3
-"""Swings below this share of the same unit, and of the bias, are rest."""
+"""Swing, over the deflection of the loop by the break-away force and by the bias, that counts as rest."""
 
 ROUNDS = (150.0, 800.0, 4000.0)
-"""Periods for which a run is followed, and followed on where that does not tell."""
+"""Periods for which a run is followed, round by round, until it is decided."""
 
 BESIDE = np.array([0.001, 0.003, 0.01])
-"""Shares by which a state in a swing is made larger and smaller: from both sides the swing has to be taken up again."""
+"""Relative changes of a state on a swing, larger and smaller. From both sides the swing has to be resumed."""
 
 LINGERING = 12_000.0
-"""Periods of a swing for which its neighbours are followed: a deviation of 0.3 % from a cycle that repels by 0.03 % a
-swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by as much as it is off 1:
-at the rough tolerance runs stay at it for 60 000 periods."""
+"""Periods of a swing for which its neighbours are followed. In that time a deviation of 0.3 % from a cycle that repels
+by 0.03 % a swing grows by a factor of a thousand. Errors of 1e-6 change such a multiplier by as much as it differs from
+1: at the rough tolerance runs stay on the cycle for 60 000 periods."""
 
 FOLLOWED = 6
-"""Runs that are followed on."""
+"""Number of runs that are followed further."""
 
 BUDGET = 100_000_000
-"""Steps that a run may take."""
+"""Most steps of a run."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Starts of one stage, (starts, states), what each of them is, and the displacement [m] or velocity [m/s]."""
+    """Starts of one stage, (starts, states), with their kinds and their displacements [m] or velocities [m/s]."""
 
     states: np.ndarray
     kinds: tuple[str, ...]
@@ -64,16 +65,18 @@ class Trial:
         return Trial(self.states[numbers], tuple(self.kinds[k] for k in numbers), self.sizes[numbers])
 
     def and_more(self, states: np.ndarray, kind: str) -> Trial:
-        """These starts, and others of one kind, whose sizes are those of their positions."""
+        """Return these starts and others of one kind, whose sizes are those of their positions."""
         kinds = self.kinds + (kind,) * len(states)
         return Trial(np.vstack([self.states, states]), kinds, np.append(self.sizes, states[:, 0]))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end (positions
-    count from where the reference rests), the time [s] for which each was followed, and the mean time of two large legs
-    in the last quarter of that [s]."""
+    """What became of starts.
+
+    It has words of `swings`, half of peak to peak at the end [m], states at the end (positions relative to the resting
+    reference), the time [s] for which each was followed, and the mean time [s] of two large legs in the last quarter.
+    """
 
     words: np.ndarray
     amplitude: np.ndarray
@@ -88,8 +91,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Bench:
-    """A stage given as flat keys, its reference held at 0 unless its own motion is followed. A `swing` that it is said
-    to keep up [m], half of peak to peak, is none that rests."""
+    """A stage given as flat keys, with its reference held at 0 unless its own motion is followed.
+
+    A claimed `swing` [m], half of peak to peak, does not count as rest.
+    """
 
     flat: Mapping[str, Any]
     swing: float = np.inf
@@ -105,18 +110,21 @@ class Bench:
 
     @cached_property
     def length(self) -> float:
-        """By how much the break-away force deflects the loop [m]."""
+        """Return the deflection of the loop by the break-away force [m]."""
         return self._number("breakaway") / self._number("stiffness")
 
     @cached_property
     def omega(self) -> float:
-        """Natural frequency of mass and loop [1/s]."""
+        """Return the natural frequency of mass and loop [1/s]."""
         return self._number("rate")
 
     @cached_property
     def period(self) -> float:
-        """About the period of a cycle that sticks at a third of that length [s]: twice the time to wind up, by the
-        integral gain of the controller, and an oscillation; infinite without an integral."""
+        """Return roughly the period [s] of a cycle that sticks at a third of `length`.
+
+        It is twice the time to wind up, by the controller's integral gain, and an oscillation; infinite without an
+        integral.
+        """
         _, integral = slow_gains(self.flat)
         wait = 3 * self._number("stiffness") / abs(integral) if integral else np.inf
         return float(2 * (wait + 2 * np.pi / self.omega))
@@ -131,8 +139,11 @@ class Bench:
         return self.kernel.settled(flat, Steady(error, position, force=force), len(position))
 
     def starts(self, releases: int, pushes: int, stuck: int, drawn: int, seed: int) -> Trial:
-        """Releases and pushes over seven decades, to either side in turn; stages stuck with a wound-up integrator; and
-        some drawn at random."""
+        """Return starts of four kinds.
+
+        Releases and pushes cover seven decades, to either side in turn; stuck stages have a wound-up integrator; some
+        starts are drawn at random.
+        """
         rng = np.random.default_rng([seed, 7])
         sign = np.where(np.arange(1000) % 2, -1.0, 1.0)
         farthest = LIMITED if "controller.force_limit" in self.flat else DECADES[1]
@@ -159,7 +170,7 @@ class Bench:
         return states
 
     def released(self, displacements: np.ndarray) -> Trial:
-        """Releases from displacements [m]."""
+        """Return releases from displacements [m]."""
         return Trial(
             self._settled(np.zeros(len(displacements)), displacements), ("release",) * len(displacements), displacements
         )
@@ -167,24 +178,32 @@ class Bench:
     def follow(
         self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS, any_will_do: bool = True
     ) -> Outcome:
-        """What becomes of starts. Of those that are not clear after a round a few go on, unless one that swings on is
-        all that is looked for."""
+        """Return what becomes of starts.
+
+        A few of the starts that are undecided after a round are followed further, unless a single swinging one is
+        enough.
+        """
         return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do)
 
     def stuck_at(self, displacements: np.ndarray) -> np.ndarray:
-        """States of the stage stuck at displacements [m], no force exerted."""
+        """Return states of the stage stuck at displacements [m], with no force exerted."""
         return self._settled(-displacements, displacements)
 
     def beside(self, end: np.ndarray, factors: np.ndarray) -> np.ndarray:
-        """A state in which a run ended, made larger and smaller by factors, (factors, kept): near a cycle that repels
-        but weakly a run lingers, the longer the finer the tolerance, and only its neighbours leave."""
+        """Return a state in which a run ended, made larger and smaller by factors, (factors, kept).
+
+        Near a weakly unstable cycle a run lingers, the longer the finer the tolerance, and only its neighbours leave.
+        """
         states = end * factors[:, None]
         states[:, len(self.kernel.states) :] = end[len(self.kernel.states) :]
         return states
 
     def sustains(self, beside: Callable[[np.ndarray], np.ndarray], time: float, words: Sequence[str]) -> bool:
-        """Whether starts beside a swing, made by `beside` from factors, end in one of some words after a time [s], at
-        both tolerances: as many per cent, or tenths of one, to one side as to the other."""
+        """Tell whether starts beside a swing end in one of some words after a time [s].
+
+        `beside` makes the starts from factors. They must do so on both sides, at equal distances, and at both
+        tolerances.
+        """
         states = beside(1 + np.concatenate([-BESIDE, BESIDE]))
         trial = Trial(states, ("beside a swing",) * len(states), np.ones(len(states)))
         both = np.ones(len(BESIDE), bool)
@@ -196,7 +215,7 @@ class Bench:
         return True
 
     def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
-        """What becomes of the stage's own motion, followed as many times its duration, and for `ROUNDS`."""
+        """Return what becomes of the stage's own motion, run for a multiple of its duration, and for `ROUNDS`."""
         periods = max(ROUNDS[0], min(longest * self.flat["motion.duration"] / self.period, ROUNDS[1]))
         corner = float(np.max(last_corner(dict(self.flat))))
         return self._follow(self.flat, None, corner, rtol, (periods, *ROUNDS[1:]), False)
@@ -232,11 +251,14 @@ class Bench:
         return Outcome(words, amplitude, ends, followed, own_periods)
 
     def _after(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The stage once its reference has come to rest; positions count from there."""
+        """Return the stage after its reference has come to rest; positions count from there."""
         return self.held if flat["motion.kind"] != "ramp" else dict(flat)
 
     def _at_rest(self, ends: np.ndarray, flat: Mapping[str, Any]) -> np.ndarray:
-        """States to go on from: positions, and what filters know of them, count from where the reference rests."""
+        """Return states to continue from.
+
+        Positions, and filters of them, count from where the reference rests.
+        """
         rest = flat["motion.size"] if flat["motion.kind"] == "step" else 0.0
         ends = ends.copy()
         ends[:, self.kernel.having(Role.POSITION)] -= rest

@@ -1,5 +1,5 @@
-"""`friso app`: all of friso live in the browser, on this machine alone.
+"""Run `friso app`: all of friso live in the browser, on this machine alone.
 
-A page holds the machine; the server answers its questions with the functions that the command line asks. It owns no
-physics, no words and no figure of its own.
+A page holds the machine. The server answers its questions with the functions behind the command line. It has no
+physics, words or figures of its own.
 """

@@ -1,4 +1,4 @@
-"""Pack what a command would write into one archive, and write nothing else."""
+"""Pack what a command would write into one archive, without writing any other file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
         out = folder / "out"
         written = answer.report(out)
         with speaking_of(answer.axis_kind):
-            for name, save in pictures(answer.figures()).items():  # some commands write figures in their page alone
+            for name, save in pictures(answer.figures()).items():  # some commands show figures in their page alone
                 if out / name not in written and callable(save):
                     save(out / name)
         for path in sorted(out.rglob("*")):

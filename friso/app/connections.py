@@ -1,6 +1,6 @@
-"""Limit who holds a connection, and for how long.
+"""Limit how many connections clients hold, and for how long.
 
-Nobody without a key can keep others from the server.
+A client without a key cannot keep others from the server.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from friso.app.gate import LET_IN
 
 MOST = 64
-"""Largest number of connections.
-
-Browsers open six to a server, and systems allow a process 256 open files or more."""
+"""Largest number of connections. Browsers open six to a server, and systems allow a process 256 open files or more."""
 
 HEADERS = 10.0
 """Time limit [s] for a request up to its body, which a browser sends at once."""
@@ -69,7 +67,7 @@ class Connection(H11Protocol):
         return self.cycle is not None and not self.cycle.response_complete
 
     def _look(self) -> None:
-        """Close the connection if its time is over; otherwise check again when it will be."""
+        """Close the connection if its time is over; otherwise schedule the next check."""
         allowed = SENDING if self._is_answering else HEADERS
         left = HEADERS if self.is_at_work else self._since + allowed - self.loop.time()
         if left <= 0:
@@ -79,9 +77,9 @@ class Connection(H11Protocol):
 
 
 class Once(logging.Filter):
-    """A filter that lets each message and its error through only once.
+    """A filter that lets each message, with its error, through only once.
 
-    Anybody who reaches the server can repeat a request that fails, and would otherwise fill the log.
+    Anybody who reaches the server can repeat a request that fails, which would otherwise fill the log.
     """
 
     def __init__(self) -> None:

@@ -43,9 +43,7 @@ TWICE = (
 )
 
 FRESH = 60.0
-"""Time [s] for which a one-time token is valid.
-
-The browser that friso started needs it within seconds."""
+"""Time [s] for which a one-time token is valid. The browser that friso starts needs it within seconds."""
 
 LOGGER = logging.getLogger("friso")
 
@@ -60,10 +58,8 @@ LET_IN = "friso.let_in"
 """Marker in the scope of a request that came with a key."""
 
 BEARER = "Bearer "
-"""Text before a key in the header `Authorization`.
-
-Browsers never add this header by themselves. Cookies, by contrast, are sent to every other server of the same name,
-whatever its port."""
+"""Text before a key in the header `Authorization`. Browsers never add this header by themselves. Cookies, by contrast,
+are sent to all servers of the same name, whatever their port."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +100,7 @@ class Access:
     def is_host(self, host: str) -> bool:
         """Tell whether the server goes by this name, in small or capital letters.
 
-        A foreign name would mean that another site made its name lead to this server.
+        A request under a foreign name means that another site made its name lead to this server.
         """
         return host.lower() in self.hosts
 
@@ -113,7 +109,7 @@ class Access:
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def session_of(self, token: str, key: str = "") -> str:
-        """Return the key of the session that a token begins; empty for a wrong token.
+        """Return the key of the session that a token begins; "" for a wrong token.
 
         A token that is valid once may return from the browser that used it, with the session's key. If it returns
         without that key, two people have seen it, and its session ends.
@@ -176,7 +172,8 @@ class Gate:
         headers, access, path = Headers(scope=scope), self.access, scope["path"]
         if not access.is_host(headers.get("host", "")) or not access.is_origin(headers.get("origin")):
             return _refused()
-        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and path != "/":  # which links lead to
+        # links from other pages lead to "/"
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and path != "/":
             return _refused()
         key = headers.get("authorization", "").removeprefix(BEARER)
         if path == ENTRY and scope["method"] == "POST":

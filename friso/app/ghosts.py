@@ -1,4 +1,7 @@
-"""Add to a figure what it is compared with: the pinned machine in grey, or the edge of hunting on a map."""
+"""Add to a figure what it is compared with.
+
+On most figures that is the pinned machine in grey, on a map the edge of hunting.
+"""
 
 from __future__ import annotations
 
@@ -47,11 +50,11 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
 
 
 _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
-"""Part of a title that belongs to one machine alone: its case, or the frequency of a mode."""
+"""Pattern of the part of a title that belongs to one machine: its case, or the frequency of a mode."""
 
 
 def _subject(panel: Panel) -> tuple[str, str, str]:
-    """Return title and axis labels of a panel, without what the title says of one machine alone."""
+    """Return title and axis labels of a panel, without the part of the title that belongs to one machine."""
     return _OWN.sub("", panel.title), panel.x.label, panel.y.label
 
 

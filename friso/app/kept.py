@@ -1,6 +1,6 @@
-"""Keep answers for later, since the same machine is often asked about again.
+"""Keep answers for later, because the same machine is often asked about again.
 
-A tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
+For example, a tab is opened again, a change is undone, a machine is pinned, or the files of an answer are downloaded.
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ if TYPE_CHECKING:
     from friso.interface.answer import Answer
 
 MOST = 4
-"""Number of latest answers kept of each function.
-
-An answer with a Bode plot takes 20 MB."""
+"""Number of latest answers that are kept of each function. An answer with a Bode plot takes 20 MB."""
 
 
 class KeptAnswers:
     """Answers of friso's functions about machines, with the notes on each.
 
-    Only the answers asked for last are kept. Several threads may use the object.
+    Only the latest answers are kept. Several threads may use the object.
     """
 
     def __init__(self) -> None:

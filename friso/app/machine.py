@@ -52,7 +52,8 @@ class Machine:
     def is_of_page(self) -> bool:
         """Tell whether only a stage file saved by the page describes this machine.
 
-        A machine made on the page has no other file. No option of a command can remove a key, either.
+        A machine made on the page has no file. Nor has one with removed keys, because no option of a command removes a
+        key.
         """
         return self.made or None in self.changes.values()
 
@@ -60,7 +61,7 @@ class Machine:
     def to_set(self) -> dict[str, Any]:
         """Return the changed keys as the option `set` of a command.
 
-        Returns nothing if the stage file that the page saves holds the changes already.
+        The result is empty if the stage file that the page saves already holds the changes.
         """
         return {"set": self.changes} if self.changes and not self.is_of_page else {}
 
@@ -74,9 +75,8 @@ _VALUES = (str, bool, int, float, type(None))
 
 
 MOST_KEPT = 16
-"""Number of latest stages kept in the cache.
-
-While a slider moves, several questions concern one machine. The text of a stage may take 4 MB."""
+"""Number of latest stages in the cache. While a slider moves, several questions concern one machine. The text of a
+stage may take 4 MB."""
 
 
 @lru_cache(MOST_KEPT)

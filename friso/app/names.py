@@ -10,9 +10,7 @@ from friso.platform.system import name_refused
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 
 LONGEST = 150
-"""Longest file name in bytes.
-
-File systems take 255, and names of accompanying files are longer."""
+"""Longest file name in bytes. File systems take 255, and names of accompanying files are longer."""
 
 
 def plain_name(name: str, otherwise: str) -> str:

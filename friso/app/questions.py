@@ -41,9 +41,7 @@ if TYPE_CHECKING:
 AnswerPart = dict[str, Any]
 
 KEPT = KeptAnswers()
-"""Kept answers about machines.
-
-Answers about runs change with a slider, and are kept for the pinned machine only."""
+"""Answers kept about machines. Answers about runs change with a slider, and are kept for the pinned machine only."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ class PageRequest:
 def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> AnswerPart:
     """Return an answer as the page shows it.
 
-    `beside` adds to each figure what it is compared with. `more` adds further entries.
+    `beside` adds to each figure what it is compared with. `more` are further entries.
     """
     return {**figures_of(answer, beside), **words_of(answer), **more}
 
@@ -100,7 +98,7 @@ def figures_of(
 
 
 def words_of(answer: Answer) -> AnswerPart:
-    """Return the words of an answer without figures, so that the figures shown stay."""
+    """Return the words of an answer without figures; the page keeps the figures it shows."""
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
@@ -118,13 +116,13 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the keys of the machine, the metrics of maps, and the questions of installed packages."""
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
-    in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # those in words first
+    in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # metrics in words first
     shown = {"others": others, "metrics": [{"id": name, "label": metric.title} for name, metric in in_order]}
     yield {"kind": "answer", **shown, **machines.machine_on_page(asked.machine)}
 
 
 def others_of_stages() -> list[str]:
-    """Return the questions of installed packages that need a stage alone.
+    """Return the questions of installed packages that need only a stage.
 
     The page shows each of them as a picture.
     """
@@ -132,15 +130,15 @@ def others_of_stages() -> list[str]:
 
 
 def _takes_a_stage_alone(name: str) -> bool:
-    """Tell whether a question needs a stage and no option.
+    """Tell whether a question needs only a stage, and no option.
 
-    Returns False for a package that cannot be loaded; `friso --help` reports it.
+    The answer is False for a package that cannot be loaded; `friso --help` reports it.
     """
     try:
         declared = DECLARED[name]
         options = (item for key, item in declared.parameters.items() if key != "stage")
         return declared.takes == ("stage",) and all(option.default is not option.empty for option in options)
-    except InputError:  # told by friso --help
+    except InputError:  # friso --help reports it
         return False
 
 
@@ -175,7 +173,7 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the verdict of each case in one word, judged by the attracting cycles.
+    """Yield the verdict on each case in one word, from its attractors.
 
     The verdict is computed as a map of one cell, or of two cells for the joint locked and free.
     """
@@ -259,11 +257,11 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
 
     def ranges(count: int) -> dict[str, Any]:
-        """Return the ranges of both axes with so many points."""
+        """Return the ranges of both axes with `count` points."""
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
     def swept(count: int) -> SweepAnswer:
-        """Return the map with so many points along each axis."""
+        """Return the map with `count` points along each axis."""
         return KEPT.answer(friso.sweep, asked.machine, work, {**ranges(count), **shown})
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
@@ -303,7 +301,7 @@ def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield where hunting ends, over one key or in the plane of two keys.
 
-    Following the edge may take minutes, so a coarse map of verdicts comes first in a plane. It stays if there is no
+    Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. It stays if there is no
     edge.
     """
     options = asked.chosen(*OPTIONS["boundary"])
@@ -342,7 +340,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     except InputError as error:  # such as a stage that cannot hunt
         whole = part(ghosts_of(None))
         whole["sentences"] = [*whole["sentences"], f"The pinned machine: {error}"]
-    work.notes[:] = notes  # without those on the pinned machine
+    work.notes[:] = notes  # leave out notes on the pinned machine
     yield whole
 
 
@@ -402,7 +400,7 @@ def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
     """
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
-    beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
+    beside = files[0].parent  # a file of that name in the folder where friso was started must not count
     with _named_as_dropped():
         return friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
 
@@ -521,7 +519,7 @@ def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]
     """Yield the files of a command's answer as one archive in base64."""
     answer = COMMANDS[command](asked, work) if command in COMMANDS else _other(command, asked, work)
     work.progress(0, 0, "drawing the figures")
-    of_logs = command in ("logs", "identify")  # a stage file that is identified is among what is written
+    of_logs = command in ("logs", "identify")  # what is written includes an identified stage file
     stem = "logs" if of_logs else asked.machine.name.removesuffix(".toml")
     held = archive(answer, {} if of_logs else {f"{stem}.toml": asked.machine.stage.to_toml()})
     yield {"kind": "files", "name": f"{stem}_{answer.command}.zip", "base64": base64.b64encode(held).decode("ascii")}
@@ -530,7 +528,7 @@ def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]
 def _lines(
     command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
 ) -> AnswerPart:
-    """Return the shell command and the line of Python for what the page shows.
+    """Return the shell command and the line of Python that repeat what the page shows.
 
     Both are about the machine shown.
     """
@@ -555,7 +553,7 @@ def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
 def _both_lines(
     command: str, asked: PageRequest, files: list[str], options: Mapping[str, Any], of: str, function: str = ""
 ) -> AnswerPart:
-    """Return a command, its line of Python, what they are about, and the question asked."""
+    """Return a command and its line of Python, with what they are about, and the question asked."""
     lines = {
         "command": command_line(command, files, options),
         "python": python_line(function or command, files, options),
@@ -573,7 +571,7 @@ def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> 
     if asked.pinned is None:
         return ghosts_of(None)
     pinned = KEPT.answer(function, asked.pinned, work)
-    work.notes.clear()  # those on the pinned machine
+    work.notes.clear()  # leave out notes on the pinned machine
     return ghosts_of(pinned)
 
 

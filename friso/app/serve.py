@@ -26,14 +26,11 @@ from friso.platform.early import SIGNALS
 from friso.stage.files import load, text_of
 
 PORT = 8741
-"""Default port.
-
-Browsers store the contents of a page by its port."""
+"""Default port. Browsers keep the contents of a page by its port."""
 
 GRACE = 2
-"""Longest wait [s] at the end for questions in progress.
-
-When stopped they end within 0.1 s, except in the middle of a figure or a solution."""
+"""Longest wait [s] at the end for questions in progress. When stopped they end within 0.1 s, except in the middle of a
+figure or a solution."""
 
 LOGS = ("uvicorn.error", "asyncio", "friso.app")
 """Loggers whose messages any client can cause."""
@@ -73,9 +70,9 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
 
 
 class Server(uvicorn.Server):
-    """A server that ends in good order on any signal.
+    """A server that shuts down in good order on any signal.
 
-    Questions at work are ended before the server waits for their answers. Afterwards the signal takes its usual
+    Questions in progress are ended before the server waits for their answers. Afterwards the signal takes its usual
     effect.
     """
 
@@ -89,7 +86,7 @@ class Server(uvicorn.Server):
             ws="none",
             lifespan="on",
             timeout_graceful_shutdown=grace,
-            backlog=MOST,  # so many are taken before those that make way have ended
+            backlog=MOST,  # this many are accepted before closed ones have ended
         )
         super().__init__(config)
         self.workshop = workshop
@@ -98,7 +95,7 @@ class Server(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Take the signals while the server runs, except ignored ones, as under nohup."""
+        """Handle the signals while the server runs, except ignored ones, as under nohup."""
         taken = {number: handler for number in SIGNALS if (handler := signal.getsignal(number)) is not signal.SIG_IGN}
         for number in taken:
             signal.signal(number, self.handle_exit)
@@ -151,7 +148,7 @@ def listening(host: str, port: int | None) -> socket.socket:
     for number in wanted:
         listener = socket.socket(family)
         try:
-            if os.name == "posix":  # else the port stays taken for a minute after a server has ended
+            if os.name == "posix":  # otherwise the port stays taken for a minute after a server has ended
                 listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind((host, number))
             listener.listen()

@@ -136,9 +136,9 @@ CHUNK = 65536
 
 
 def _file(request: Request, content: bytes, kind: str) -> Response:
-    """Send a file in chunks, or only confirm that the browser has this content already."""
+    """Send a file in chunks, or only confirm that the browser already has this content."""
     mark = f'"{sha256(content).hexdigest()}"'
-    headers = {"ETag": mark, "Cache-Control": "no-cache"}  # which is to ask whether it is still the same
+    headers = {"ETag": mark, "Cache-Control": "no-cache"}  # the browser must ask whether the file has changed
     if mark in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
 

@@ -27,7 +27,7 @@ class Uploads:
     """Dropped files by the names under which the page knows them.
 
     The page can name no other file. Names are random, so a page left open cannot reach files of a later server. The
-    next server deletes what a killed one left.
+    next server deletes what a killed one left behind.
     """
 
     def __init__(self) -> None:
@@ -70,7 +70,7 @@ class Uploads:
         return path
 
     def let_go(self, name: str) -> None:
-        """Delete a dropped file. Raises InputError for an unknown name."""
+        """Delete one dropped file. Raises InputError for an unknown name."""
         place = self.path(name).parent
         del self.files[name]
         remove_folder(place)

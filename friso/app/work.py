@@ -30,14 +30,12 @@ OFTEN = 0.1
 """Time [s] between two reports of progress."""
 
 THREADS = 16
-"""Number of questions in progress at one time.
-
-Many wait for a kernel, or for earlier computations."""
+"""Number of questions in progress at one time. Many wait for a kernel, or for earlier computations."""
 
 
 @dataclass(eq=False)
 class Work:
-    """A question at work.
+    """A question in progress.
 
     `put` sends a part of its answer to the page. `number` orders the questions of a page. Another thread sets `flag` to
     end the work.
@@ -55,7 +53,7 @@ class Work:
     """Messages logged early, most of which the answer repeats."""
 
     def overtake(self) -> None:
-        """Ask this question to stop; safe to call from another thread."""
+        """Ask this question to stop; any thread may call this."""
         self.flag[0] = 1
 
     def progress(self, done: int, total: int, label: str, /) -> None:
@@ -88,7 +86,7 @@ class Work:
         except InputError as error:
             self.put({"kind": "refused", "key": error.key, "text": str(error)})
         except Exception as error:  # a page is answered whatever happens; the terminal has the rest
-            if self.flag[0]:  # nobody waits, and at the end of the process pools take no more work
+            if self.flag[0]:  # nobody waits, and pools take no more work while the process ends
                 logging.getLogger("friso").debug("failed once it was overtaken", exc_info=True)
                 self.put({"kind": "overtaken"})
             else:
@@ -129,7 +127,7 @@ _IMPORTING = Lock()
 
 
 class Workshop:
-    """The questions at work, one on every lane of a page.
+    """The questions in progress, one on every lane of a page.
 
     A newer question, which has a larger number, overtakes the older one on its lane. The order of arrival does not
     matter.

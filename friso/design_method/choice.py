@@ -21,7 +21,7 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A candidate by the beam model: drive stiffness [N/m] and first interfering frequency [Hz].
+    """A candidate evaluated by the beam model: drive stiffness [N/m] and first interfering frequency [Hz].
 
     Both are NaN if the model could not be evaluated; `failure` gives the reason.
     """
@@ -50,7 +50,7 @@ class ChosenLeaves:
     def frequency(self) -> float:
         """Return the first interfering frequency [Hz], the lower one of both models.
 
-        In one model, two modes may hide each other.
+        Either model may miss a mode, where two modes hide each other.
         """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
@@ -86,7 +86,7 @@ def stays(task: LeafTask, by_beams: Evaluation) -> bool:
 
 
 def bears(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Tell whether the leaves also bear bending and load by the beam model."""
+    """Tell whether, by the beam model, the leaves also bear bending and load."""
     safety = task.spec.safety
     swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
     lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1

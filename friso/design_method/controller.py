@@ -23,7 +23,7 @@ RATIOS = np.geomspace(0.02, 0.7, 9)
 
 @dataclass(frozen=True)
 class Damping:
-    """Joint dampings tried [N s/m], with the least modulus margin of each (0: unstable).
+    """Joint dampings that were tried [N s/m], with the least modulus margin of each (0: unstable).
 
     The stage's own damping comes first.
     """

@@ -21,12 +21,12 @@ from friso.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Corners:
-    """The corners of a specification with the edge of hunting of each.
+    """Corners of a specification with the edge of hunting of each.
 
     `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts. It is 0 if it does not hunt from
     `searched[0]` on, and infinite if it still hunts at `searched[1]`. In `unknown` corners the edge is not certain:
-    simulations below it failed or had not settled, which counts as hunting. There may also be attractors above it that
-    no simulation starts from.
+    simulations below it failed or did not settle, which counts as hunting. Above it there may be attractors that no
+    simulation reached.
     """
 
     population: Population
@@ -62,7 +62,7 @@ def edges_over(
     progress: Progress = silent,
     label: str = "",
 ) -> Corners:
-    """Find the edges of the stage `flat` in all corners, tuned by van Dijk's rules.
+    """Find the edges of the stage `flat` in all corners, with van Dijk's tuning rules.
 
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts, then refines between
     that point and the one above. `label` names the search to the progress.
@@ -118,7 +118,7 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tell whether corners hunt, or may hunt, at logarithms of crossovers, and whether that is certain."""
+    """Tell which corners hunt, or may hunt, at logarithms of crossovers, and for which that is certain."""
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)

@@ -33,7 +33,7 @@ class Candidate:
 def front(task: LeafTask) -> list[Candidate]:
     """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
 
-    It is empty if no geometry meets the requirements. The requirement on the frequency is an objective here.
+    It is empty if no geometry meets the requirements. The requirement on the frequency serves as an objective.
     """
     settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -49,7 +49,7 @@ def front(task: LeafTask) -> list[Candidate]:
     first = low + (high - low) * np.random.default_rng(settings.front_seed).random(
         (settings.front_population, len(low))
     )
-    first[: len(first) // 4] = start  # from where the others are reached, however little room there is
+    first[: len(first) // 4] = start  # from there the search reaches others, however little room there is
     variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
     algorithm = NSGA2(pop_size=settings.front_population, **variation)
     with np.errstate(invalid="ignore"):  # pymoo's distances within a front of a single geometry
@@ -97,10 +97,9 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
 
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
-    """Return a geometry that meets the requirements with the largest reserve; None if none does.
+    """Return the geometry that meets the requirements with the largest reserve; None if none does.
 
-    It is found by differential evolution, and given as logarithms of its sizes with the number of its sheet, shape
-    (4,).
+    Differential evolution finds it. It is given as logarithms of its sizes and the number of its sheet, shape (4,).
     """
     settings = DesignSettings.current()
     bought = sheets(task.spec)

@@ -68,7 +68,7 @@ class Geometry:
 def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
     """Build mechanisms from lengths, widths and spacings [m], shape (count, 3), and sheets.
 
-    They stand in the stage `flat`.
+    All other numbers are those of the stage `flat`.
     """
     sheet_materials = [materials()[sheet.material] for sheet in bought]
     columns = {

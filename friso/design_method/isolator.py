@@ -14,7 +14,8 @@ from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 
 STROKE = 1e-3
-"""Joint from which a search starts: stroke [m], force at the stroke over static friction, damping ratio."""
+"""Stroke [m] of the joint from which a search starts. `first_force_share` and `first_damping` of the settings give the
+rest."""
 
 STEEL = 190e9
 """Young's modulus of spring steel [Pa], the default for leaves and stops."""
@@ -31,7 +32,7 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
 
 
 def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
-    """Return the stage with a free joint: its own, or one from which a search starts.
+    """Return the stage with a free joint: its own joint, or one from which a search starts.
 
     The new joint has a stroke [m] and leaves with a Young's modulus `young` [Pa]. The controller stays tuned for the
     whole mass. Raises StageError if the result is not a valid stage.

@@ -1,6 +1,6 @@
 """Find leaf springs for a joint of given stiffness and stroke.
 
-Of all that fit, those with the highest interfering frequency are taken.
+Of all leaf springs that fit, those with the highest interfering frequency are chosen.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     """
     spec = read_spec(outline(stage))
     low, high = box(spec)
-    first = Geometry.of(np.array([low[0], *high[1:]]), sheets(spec)[-1])  # what bears the largest load
+    first = Geometry.of(np.array([low[0], *high[1:]]), sheets(spec)[-1])  # the leaves that bear the largest load
     replaced = {"joint.stiffness": None} | ({"parasitic": None} if stage.parasitic else {})
     written = present.flexure.as_written() if present.flexure else {}
     carried = {f"flexure.{key}": entry for key, entry in written.items() if key not in OF_LEAVES}
@@ -55,7 +55,7 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     flat, friction = base.flat(), float(least_breakaway(base.flat()))
     task = LeafTask(spec, flat["joint.stroke"], 0.0, friction, flat)
     search = _Search(task, stage.flat()["joint.stiffness"])
-    with np.errstate(all="ignore"):  # what has no width of this stiffness breaks the requirements
+    with np.errstate(all="ignore"):  # leaves without a width for this stiffness break the requirements
         geometries = search.whole_sizes(search.best())
     for geometry in geometries:
         with suppress(BeamFailure):
@@ -70,7 +70,7 @@ def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
 
 
 class _Search:
-    """The search over length, spacing and sheet of the leaves, whose width follows from the stiffness."""
+    """Search over length, spacing and sheet of the leaves, whose width follows from the stiffness."""
 
     def __init__(self, task: LeafTask, stiffness: float) -> None:
         """Prepare the search for leaves of a `stiffness` [N/m].
@@ -134,7 +134,7 @@ class _Search:
         return np.where(np.isfinite(worst), worst, settings.worst_cost)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
-        """Return the geometries in whole sizes next to one of shape (3,), with the required stiffness.
+        """Return the geometries in whole sizes next to `best`, (3,), with the required stiffness.
 
         They break no requirement, and the highest interfering frequency comes first.
         """

@@ -44,13 +44,13 @@ Frictions = Callable[[Sequence[Stage]], OtherLaws]
 
 
 def own_law(stages: Sequence[Stage]) -> OtherLaws:
-    """Return no friction laws besides the stages' own."""
+    """Return no friction laws other than the stages' own."""
     return OtherLaws()
 
 
 @dataclass(frozen=True)
 class Need:
-    """Result that decides whether a machine needs an isolator.
+    """Whether a machine needs an isolator, with the result that decides it.
 
     `without` are the edges of hunting without an isolator over the corners of the specification.
     """
@@ -60,7 +60,7 @@ class Need:
 
     @property
     def isolator(self) -> bool:
-        """Tell whether the machine hunts without isolator at all crossovers that it allows."""
+        """Tell whether the machine hunts without isolator at all crossovers up to its limit."""
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
@@ -131,8 +131,8 @@ class Design:
     def unmet(self) -> tuple[Relaxation, ...]:
         """Return what to relax if moves settle too late: the settling time, with the time needed.
 
-        More joint damping is named before it, if that allows a higher crossover. Moves that do not come to rest are
-        reported by the verification itself.
+        If more joint damping allows a higher crossover, it comes first. Moves that do not come to rest are reported by
+        the verification itself.
         """
         settings = DesignSettings.current()
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(settings.slow_share)
@@ -156,7 +156,7 @@ class Design:
 
     @property
     def needed(self) -> bool:
-        """Tell whether the machine hunts without isolator at all crossovers that it allows."""
+        """Tell whether the machine hunts without isolator at all crossovers up to its limit."""
         return self.need.isolator
 
 
@@ -164,7 +164,8 @@ class Design:
 class UnfinishedDesign:
     """Design left by an interruption: leaf springs, stroke and crossover, not tried in moves.
 
-    `need` tells whether an isolator is needed; `edges` of hunting with it are None if they were not found yet.
+    `need` tells whether an isolator is needed; `edges` of hunting with the isolator are None if they were not found
+    yet.
     """
 
     spec: Spec
@@ -276,10 +277,10 @@ def _by_law(
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
-    """Return the least joint damping that no longer limits the crossover.
+    """Return the least joint damping with which margins no longer limit the crossover.
 
-    The crossover [Hz] that leaves and machine then allow is returned with it. Returns nothing if the crossover is that
-    high already, or if no tried damping helps.
+    The crossover [Hz] that leaves and machine then allow is returned with it. The damping is None if the crossover is
+    that high already, or if no tried damping helps.
     """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
@@ -296,9 +297,9 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 
 
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
-    """Return the front for the largest stroke that allows the machine's limit.
+    """Return the front for the largest stroke that allows the machine's limit on the crossover.
 
-    Otherwise it is the front that allows the highest crossover. Raises NoDesign if no leaf springs meet the
+    If no stroke does, it is the front that allows the highest crossover. Raises NoDesign if no leaf springs meet the
     requirements.
     """
     settings = DesignSettings.current()
@@ -361,9 +362,9 @@ def _down(crossover: float) -> float:
 
 
 def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
-    """Check the distance of the crossover from the edge of hunting.
+    """Check that the crossover keeps its distance from the edge of hunting.
 
-    Raises NoDesign if it is too small.
+    Raises NoDesign if it does not.
     """
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest

@@ -1,4 +1,4 @@
-"""Analyse the loop with all modes of the leaf springs that actuator and sensor see.
+"""Analyse the loop with all modes of the leaf springs that actuator and sensor both see.
 
 The equations of motion contain only one of these modes.
 """
@@ -21,16 +21,16 @@ from friso.frequency.settings import FrequencySettings
 from friso.leaf_springs.evaluation import Evaluation
 
 AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
-"""Frequencies at which the loop is evaluated about a mode, in units of its half width."""
+"""Frequencies around a mode at which the loop is evaluated, in units of its half width."""
 
 
 @dataclass(frozen=True)
 class Modal:
     """Settled states of a stage (members,), with their plants over `omega` [rad/s].
 
-    `bare` are the plants without parasitic mode, and `with_modes` those with the modes of the leaf springs. Both have
-    shape (members, frequencies) [m/N] and include the drive. Modes add to the motion of the stage as a rigid mass,
-    whatever the cart does far below them.
+    `bare` are the plants without parasitic mode, and `with_modes` the plants with the modes of the leaf springs. Both
+    have shape (members, frequencies) [m/N] and include the drive. Modes are added to the motion of the stage as a rigid
+    mass, because they lie far above the frequencies at which the cart matters.
     """
 
     flat: Mapping[str, Any]
@@ -76,12 +76,12 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Count how often curves, (..., frequencies), run around the origin from the first frequency to the last."""
+    """Count how often curves, (..., frequencies), run around the origin over all frequencies."""
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """Return the part of all modes but the drive mode in the plant [m/N].
+    """Return the contribution of all modes but the drive mode to the plant [m/N].
 
     `omega` are frequencies [rad/s]; the result has shape (frequencies,).
     """

@@ -1,4 +1,4 @@
-"""Write a specification to begin with from a stage file.
+"""Write a first specification from a stage file.
 
 Ranges lie around the stage's own numbers, and leaves have sizes that are sold.
 """
@@ -93,7 +93,7 @@ def _aligned(lines: Sequence[str]) -> str:
 
 
 def _line(stage: Stage, key: str, share: float) -> str:
-    """Return the range of a key: its own, or a fraction around its value.
+    """Return the line of a key with its range: the stage's own, or a fraction around its value.
 
     Coulomb friction does not exceed the static friction.
     """

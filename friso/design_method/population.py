@@ -24,7 +24,7 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the stage's flat keys with the values drawn for each machine; the controller stays."""
+        """Return the stage's flat keys with the values of each machine; the controller stays unchanged."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:
@@ -35,9 +35,9 @@ class Population:
 def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     """Return the corners of a specification: the ends of all ranges of friction and masses.
 
-    For static friction and gap, the middles are included. Static friction and gap are combined with each other, and
-    with masses that are all light or all heavy. The rest of the friction goes together, except that viscous friction
-    goes against it because it damps. Raises InputError if friction never falls.
+    For static friction and gap, the middles are included too. Static friction and gap are combined with each other, and
+    with masses that are all light or all heavy. All other friction is at its ends together, but viscous friction at the
+    opposite end, because it damps. Raises InputError if friction never falls.
     """
     settings = DesignSettings.current()
     friction, masses = _friction(spec, flat), _masses(spec)
@@ -137,7 +137,8 @@ def _population(
 ) -> Population:
     """Return machines at fractions, from 0 to 1, of the ranges.
 
-    Sliding friction is limited to the static friction. Machines with both equal cannot hunt, but exist.
+    Sliding friction is limited to the static friction. Machines with both equal are included, although they cannot
+    hunt.
     """
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}

@@ -16,15 +16,15 @@ from friso.stage import Stage
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
 
 LIMITS = ("force_limit", "anti_windup", "anti_windup_time")
-"""Keys of a controller that are kept when its rules are replaced."""
+"""Keys of a controller that are kept when the controller is replaced by van Dijk's rules."""
 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
     """Return the stage with a free joint of the largest leaf springs allowed.
 
     The leaf springs are a start, to be replaced. Masses, for which the controller is tuned, lie in the middle of their
-    ranges. Points of the stage keep their distance from the leaf ends, and the load is the specification's. Raises
-    InputError for a stage that cannot have an isolator.
+    ranges. Points of the stage keep their distance from the leaf ends, and the load comes from the specification.
+    Raises InputError for a stage that cannot have an isolator.
     """
     check_designable(stage)
     stage = complete_joint(by_rules(stage), spec)
@@ -36,7 +36,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
         if (mass := getattr(spec.masses, name)) is not None
     }
     if masses and "tuned_mass" in stage.controller.as_written():
-        masses[TUNED_MASS] = None  # it follows the masses
+        masses[TUNED_MASS] = None  # the controller follows the masses
     sizes = {f"flexure.{name}": exactly(section.space(name)[1], "m") for name in ("length", "width", "spacing")}
     leaves = {
         "flexure.leaves": section.leaves[0],
@@ -57,10 +57,10 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
 
 def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
-    """Return the key of the offset of actuator and sensor from mid-width; empty if the stage states one.
+    """Return the key of the offset of actuator and sensor from mid-width.
 
-    Without an offset, neither would see a mode in which the stage turns about the leaves, which no real machine
-    achieves.
+    The result is empty if the stage states an offset. Without one, neither would see a mode in which the stage turns
+    about the leaves, which no real machine achieves.
     """
     points = {f"flexure.{point}_{axis}" for point in ("actuation", "sensor") for axis in "xyz"}
     if points & stage.flat().keys() or not spec.leaves.offset:
@@ -93,7 +93,7 @@ def complete_joint(stage: Stage, spec: Spec) -> Stage:
 
 
 def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
-    """Return the masses and joint keys assumed for a stage without a joint, by key [SI]."""
+    """Return the masses and joint keys that are assumed for a stage without a joint, by key [SI]."""
     if stage.joint is not None:
         return {}
     before, after = stage.flat(), complete_joint(stage, spec).flat()

@@ -1,6 +1,6 @@
 """Find which single requirement to relax if no leaf springs meet all of them.
 
-The least change that is enough is computed for each requirement.
+For each requirement the least sufficient change is computed.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
 
 
 def _change(relaxation: Relaxation) -> float:
-    """Return how large a change is, as the logarithm of a factor."""
+    """Return the size of a change, as the logarithm of a factor."""
     return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 
@@ -74,7 +74,7 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
 
 @dataclass(frozen=True)
 class _Trials:
-    """Geometries in more space than allowed, as variables.
+    """Geometries in more space than allowed, given by variables.
 
     The variables are logarithms of length, width, spacing and thickness, and the number of the kind. The thickness is
     `free`, or is rounded to the next available sheet.
@@ -114,11 +114,11 @@ class _Trials:
 
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
-    """Return the least relaxation of requirement `k` with which the others can be met."""
+    """Return the least relaxation of requirement `k` with which all others can be met."""
     settings = DesignSettings.current()
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
-    spare = np.where(of_sheets, 0.0, settings.relaxed_reserve)  # what may be bought is met exactly
+    spare = np.where(of_sheets, 0.0, settings.relaxed_reserve)  # sizes of sheets are met exactly
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *trials.built(x))
@@ -132,7 +132,7 @@ def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxat
         "rng": settings.relaxed_seed,
         "polish": False,
     }
-    with np.errstate(divide="ignore"):  # a requirement that asks for nothing
+    with np.errstate(divide="ignore"):  # a requirement of nothing divides by 0
         minimum = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
     if minimum.fun >= settings.unmet_penalty:
         return

@@ -1,4 +1,4 @@
-"""Define what a specification requires of leaf springs, each requirement as a ratio.
+"""Define the requirements of a specification on leaf springs, each as a ratio.
 
 Closed forms evaluate many geometries at once.
 """
@@ -137,7 +137,10 @@ def requirements(task: LeafTask) -> list[Requirement]:
 
 
 def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
-    """Return a smaller load along the leaves, if that alone is enough; the stage's weight stays."""
+    """Return a smaller load along the leaves, if that alone is enough.
+
+    The weight of the stage stays.
+    """
     load = task.spec.load
     force = float(load.force_x)
     if not force or load.force_y or load.moment_y:
@@ -170,8 +173,8 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
 def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
     """Return the load on the leaves relative to the load at which they buckle.
 
-    It adds two parts: the largest force along a leaf, as if it pressed on all, over the `buckling` load [N]; and the
-    force across the leaves over that at which they buckle sideways.
+    It adds two parts: the largest force along a leaf, times the number of leaves, over the `buckling` load [N]; and the
+    force across the leaves over the force at which they buckle sideways.
     """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
@@ -199,8 +202,8 @@ def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
 def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
     """Return the stress at the clamps by the loads [Pa].
 
-    A force across the leaf ends bends leaves in their plane as cantilevers, because nothing else holds the stage about
-    z. A moment about x bends them as leaves whose ends stay parallel.
+    A force across the leaf ends bends leaves in their plane like cantilevers, because nothing else holds the stage
+    about z. A moment about x bends them like leaves whose ends stay parallel.
     """
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
     about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2

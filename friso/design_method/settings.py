@@ -45,7 +45,7 @@ class DesignSettings(Settings):
     """Strokes of the map. Fewer show steps in the edge; each is a search of a cell."""
 
     map_reach: tuple[tuple[float, ...], ...] = setting(((1 / 30, 2.0), (1 / 30, 3.0)), "")
-    """Range of the map in units of the design, which shows both edges of hunting of the thesis's rig."""
+    """Range of the map relative to the design. It shows both edges of hunting of the thesis's rig."""
 
     stage_mass_share: float = setting(0.3, "")
     """Fraction of the mass on the joint if the stage file has one mass. The thesis's rig has 0.29."""
@@ -69,7 +69,7 @@ class DesignSettings(Settings):
     """Generations of the search for leaves. Fewer have not converged."""
 
     leaves_points: int = setting(20, "")
-    """Points for each of three variables. Fewer stay at the first thickness."""
+    """Points for each of the three variables of a search for leaves. Fewer stay at the first thickness."""
 
     highest_mode: float = setting(1e6, "Hz")
     """Frequency of leaves without a mode that both actuator and sensor see."""
@@ -78,7 +78,7 @@ class DesignSettings(Settings):
     """Cost above that of any leaves that meet the requirements."""
 
     width_steps: int = setting(5, "")
-    """Steps that adapt the width to the stiffness, to a percent under any load."""
+    """Steps that adapt the width to the stiffness, to within a percent under any load."""
 
     stiffness_error: float = setting(0.01, "")
     """Relative error of the stiffness allowed for whole sizes."""
@@ -96,20 +96,20 @@ class DesignSettings(Settings):
     """Crossovers of the search for an edge. Fewer step over a narrow range of hunting."""
 
     above_crossover: float = setting(2.0, "")
-    """Factor on the chosen crossover beyond which an edge does not matter."""
+    """Factor on the chosen crossover above which an edge does not matter."""
 
     slow_share: float = setting(0.05, "")
     """Fraction of the moves that may take longer than specified. Less would need ten times the moves."""
 
     design_rounds: int = setting(12, "")
-    """Rounds of leaves and crossover after which they do not agree."""
+    """Most rounds of adapting leaves and crossover to each other."""
 
     lower_crossover: float = setting(0.97, "")
     """Factor by which the crossover is lowered in a round. Smaller steps need more rounds; larger ones waste crossover.
     """
 
     accepted_crossover: float = setting(0.98, "")
-    """Fraction of the possible crossover that is accepted rather than softer leaves."""
+    """Fraction of the possible crossover that is enough; softer leaves are then preferred."""
 
     friction_spread: float = setting(0.3, "")
     """Relative spread of friction, as in catalogues of bearings of one type."""
@@ -155,7 +155,7 @@ class DesignSettings(Settings):
     """Reserve for the error of closed forms (docs/evidence/flexure.md), so that the beam model confirms the result."""
 
     verified_moves: int = setting(10_000, "")
-    """Verified moves, which show 95 % to half a percent."""
+    """Number of verified moves, which shows 95 % to half a percent."""
 
     followed_time: float = setting(15.0, "s")
     """Time for which a move is followed, as in the thesis's path."""

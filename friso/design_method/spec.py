@@ -1,4 +1,7 @@
-"""The specification of a friction isolator: what the machine is, what it has to do, and what may be built."""
+"""Declare the specification of a friction isolator.
+
+It says what the machine is, what it has to do, and what may be built.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,10 @@ from friso.stage.section import Section, Table
 
 @dataclass(frozen=True)
 class OneOrMany:
-    """A key that takes one item or a list of them, each read by `read_one`, which raises SpecError."""
+    """A key that takes one item or a list of items.
+
+    `read_one` reads each item, and raises SpecError.
+    """
 
     of: Quantity | Number | None
     example: str
@@ -75,7 +81,7 @@ GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7,
 
 @dataclass(frozen=True)
 class Gauges(OneOrMany):
-    """A list of thicknesses, or a range that stands for the usual gauges in it."""
+    """A key that takes a list of thicknesses, or a range, which stands for the usual gauges in it."""
 
     def read(self, entry: Any) -> tuple[Any, ...]:
         """Read the thicknesses. Raises SpecError."""

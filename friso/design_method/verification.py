@@ -31,17 +31,17 @@ THERE_AND_BACK = {
     "return_at": "5 s",
     "duration": "20 s",
 }
-"""A motion whose numbers are replaced by those of each machine."""
+"""A motion with placeholder numbers, which each machine replaces."""
 
 
 @dataclass(frozen=True)
 class MachineOutcomes:
     """Outcomes of machines after their moves, as arrays of shape (count,).
 
-    `words` say what the run does at its end (`friso.hunting.criteria.run_outcome`), with the position window as band. A
-    machine rests if it stays in the window for the last quarter of the run. For other machines, the words are those of
-    a run ten times as long. `settling` [s] is the time after the reference's last corner from which the stage stays in
-    the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter.
+    `words` say what the run does until its end (`friso.hunting.criteria.run_outcome`), with the position window as
+    band. A machine rests if it stays in the window for the last quarter of the run. For all other machines, the words
+    are those of a run ten times as long. `settling` [s] is the time after the reference's last corner from which the
+    stage stays in the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter.
     """
 
     words: np.ndarray
@@ -158,7 +158,7 @@ def move_machines(
             progress,
             f"{label}, those not at rest for longer",
         )
-        better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
+        better = np.flatnonzero(longer.completed)  # if the long run fails, the word of the short one stays
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first

@@ -1,1 +1,1 @@
-"""Parameter files of drives and motion controllers: from them to stages, and back to what is typed into a drive."""
+"""Turn parameter files of drives and motion controllers into stages, and stages into such parameters."""

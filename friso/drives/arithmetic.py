@@ -19,14 +19,14 @@ _PAIRS = {ast.Add: add, ast.Sub: sub, ast.Mult: mul, ast.Div: truediv}
 _SIGNS = {ast.USub: neg, ast.UAdd: pos}
 
 _OTHER = re.compile(r"\d(?!e[+-]?\d)[a-z_]|\\", re.IGNORECASE)
-"""Pattern of texts that are not arithmetic and would make Python's parser warn, such as letters after a digit in 0x10.
-"""
+"""Pattern of texts that are not arithmetic and would make Python's parser warn, such as letters after a digit in
+0x10."""
 
 
 def number_in(text: str) -> float | None:
     """Return the number that a text stands for, or None if it is no number.
 
-    Arithmetic with +, -, *, /, brackets, pi and inf is worked out. Python code is never executed.
+    Arithmetic with +, -, *, /, brackets, pi and inf is evaluated. Python code is never executed.
     """
     if len(text) > LONGEST or _OTHER.search(text):
         return None

@@ -59,10 +59,10 @@ def travel_of(flat: Mapping[str, Any]) -> float | None:
 
 @dataclass(frozen=True)
 class Turn:
-    """Travel of a turn and force of an ampere, by which units of motor and load are converted.
+    """Travel of a turn and force of an ampere, which convert units between motor and load.
 
     `travel` is how far one turn moves the load [m or rad]. `per_ampere` is the force or torque at the load per ampere
-    [N/A or N m/A]. Either is None where it is unknown.
+    [N/A or N m/A]. Either is None if unknown.
     """
 
     travel: float | None
@@ -141,7 +141,7 @@ def _frequency(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
 
 
 def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a length [m] to turns of the motor, where the travel is known."""
+    """Convert a length [m] to turns of the motor, if the travel is known."""
     return [(value / turn.travel, "turn")] if turn.travel else []
 
 
@@ -156,7 +156,7 @@ def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
 
 
 def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    """Convert a force [N or N m] to current and motor torque, where the turn is known."""
+    """Convert a force [N or N m] to current and motor torque, if the turn is known."""
     at_motor = [(value * turn.travel / (2 * pi), "N*m at the motor")] if turn.travel else []
     return [*at_motor, *([(value / turn.per_ampere, "A")] if turn.per_ampere else [])]
 
@@ -175,7 +175,7 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
             values.append((value / turn.per_ampere, shown))
         if turn.travel:
             at_motor = value * (turn.travel / (2 * pi)) ** 2
-            place = "" if kind == LINEAR else " at the motor"  # the load's gains are per angle too
+            place = "" if kind == LINEAR else " at the motor"  # gains of the load are per angle too
             values += [(at_motor * factor, f"N*m{angle}{place}") for angle, factor in per]
             if turn.per_ampere:
                 ampere = turn.per_ampere * turn.travel / (2 * pi)  # torque of an ampere

@@ -1,4 +1,4 @@
-"""Draw the loop of a controller in characters, to show which structure its gains belong to."""
+"""Draw the loop of a controller in characters, to show to which structure its gains belong."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ASIDE = 6
 
 
 class Canvas:
-    """A drawing of the loop from the error to the force.
+    """Drawing of the loop from the error to the force.
 
     Boxes and sums are added from left to right. Feedback and feedforward enter on lines above and below.
     """
@@ -47,7 +47,7 @@ class Canvas:
     def sum(self, above: str = "", below: str = "", minus: bool = True, deep: bool = False) -> None:
         """Add a sum of the signal and of what enters from above or below.
 
-        What enters from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`.
+        A signal from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`.
         """
         self.lines[MAIN] += "--(+)"
         place = len(self.lines[MAIN]) - 2

@@ -52,7 +52,7 @@ class AxisParameters:
             raise InputError(name, "nothing", "a number", f"{name} = 1.0")
         if symbols and isinstance(entry, str) and not _NUMBER.fullmatch(entry.strip()):
             if entry not in symbols:
-                names = [*symbols][: len({*symbols.values()})]  # those written in one way
+                names = [*symbols][: len({*symbols.values()})]  # each symbol in one spelling
                 expected = f"a number, or one of {', '.join(names)}"
                 raise InputError(name, quoted(entry), expected, f"{name} = 1")
             return symbols[entry]
@@ -97,7 +97,7 @@ ENDLESS = ("", "inf", "+inf", "infinity")
 
 @dataclass(frozen=True)
 class AsStage:
-    """The stage that an axis's parameters describe, as tables of a stage file.
+    """Stage that an axis's parameters describe, as tables of a stage file.
 
     `left_out` says in sentences which settings of the drive a stage cannot describe.
     """
@@ -127,8 +127,8 @@ class ParameterFormat:
     anything.
 
     `questions_back`, `parameters` and `text` lead from a stage back to the drive. They list what is still unknown,
-    compute the parameters, and write them as a file. `whole` takes in other files of the same folder through
-    `Beside`.
+    compute the parameters, and write them as a file. `whole` includes other files of the same folder, which it reads
+    through `Beside`.
     """
 
     title: str
@@ -146,18 +146,17 @@ class ParameterFormat:
 
 
 TOLD = ("machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn")
-"""Keys of [drive] that hold the units of a drive, as told to friso init --from or read from a file.
-
-friso export needs them."""
+"""Keys of [drive] that hold the units of a drive. They are given to friso init --from or read from a file, and friso
+export needs them."""
 
 FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 
 
 def si(value: float, unit: str) -> str:
-    """Write a number in SI as it stands in a stage file, with its unit."""
+    """Write a number in SI with its unit, in the form of a stage file."""
     return f"{value:.15g} {unit}"
 
 
 def lacks(what: str, expected: str, example: str = "") -> InputError:
-    """Build the refusal of a controller that a parameter format cannot hold."""
+    """Build the error for a controller that a parameter format cannot hold."""
     return InputError("controller", what, expected, example)

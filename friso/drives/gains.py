@@ -1,4 +1,4 @@
-"""Give the gains of a stage as they are typed into a drive."""
+"""Give the gains of a stage as an engineer types them into a drive."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Gains:
 
     @property
     def text(self) -> str:
-        """Return the parameters as a file for the drive holds them; empty without a kind of drive."""
+        """Return the parameters as the drive's file holds them; "" without a kind of drive."""
         return self.kind.text(self.parameters) if self.kind and self.parameters else ""
 
 
@@ -81,5 +81,5 @@ def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
     numbers = [name for name in names if name not in held and not isinstance(flat[before + name], str)]
-    parts = [".".join(name.split(".")[:2]) for name in numbers]  # of all keys of a filter, the filter
+    parts = [".".join(name.split(".")[:2]) for name in numbers]  # all keys of a filter count as the filter
     return tuple(dict.fromkeys(before + part for part in parts if part not in held))

@@ -1,4 +1,4 @@
-"""Ask at once for everything that a parameter file does not tell, and read the answers."""
+"""Ask at once for everything that a parameter file does not say, and read the answers."""
 
 from __future__ import annotations
 
@@ -93,10 +93,10 @@ class UserAnswers:
 
 
 def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[OpenQuestion, ...]:
-    """List what no drive knows of its machine and the user has not said yet.
+    """List what no drive knows about its machine and the user has not said yet.
 
-    Moving mass and friction are asked for. A move to try is asked for unless the file gives one (`moved`). Raises
-    InputError for an unknown friction law.
+    They are moving mass and friction, and a move to try unless the file gives one (`moved`). Raises InputError for an
+    unknown friction law.
     """
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
@@ -128,10 +128,7 @@ def _of_table(
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
-    """Refuse to go on while questions are open.
-
-    Raises InputError that lists all of them at once.
-    """
+    """Refuse to go on while questions are open. Raises InputError that lists all of them at once."""
     asked = list(questions)
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"

@@ -1,6 +1,6 @@
 """Turn a parameter file into a stage file.
 
-The text was written by others, so its size is limited and no value is trusted unchecked.
+Others wrote the text, so its size is limited and no value is trusted unchecked.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
     try:
         answers = UserAnswers(user_answers)
         asked = kind.questions(chosen, answers)
-        of_axis = kind.stage(chosen, answers.with_examples(asked) if asked else answers)  # refuses before it is asked
+        # raises for unusable numbers before anything is asked
+        of_axis = kind.stage(chosen, answers.with_examples(asked) if asked else answers)
         refuse_open(asked, f"{path}, {chosen.name}")
         answers.refuse_unwanted()
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
@@ -107,7 +108,7 @@ def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> A
 def _with_answers(
     of_axis: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
 ) -> Stage:
-    """Build the stage from the tables of an axis with the user's answers laid over them.
+    """Build the stage from the tables of an axis, with the user's answers laid over them.
 
     Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults.
     """
@@ -125,7 +126,7 @@ def _with_answers(
                 raise InputError(key, quoted(str(value)), "a key of a table of the stage", 'masses.stage="3 kg"')
             keys[name] = value
         elif key in TOLD:
-            tables.setdefault("drive", {}).setdefault(key, value)  # a unit that the format has read has its own name
+            tables.setdefault("drive", {}).setdefault(key, value)  # a unit that the format has read keeps its name
     friction: dict[str, Any] = tables.get("friction", {})
     if friction.get("model") == "none":
         tables.pop("friction")

@@ -17,8 +17,8 @@ PER_BATCH = 1e5
 """Work to prepare a batch of runs."""
 
 COUNTED_LANES = 8
-"""Runs that count as done side by side on every processor. One with fewer lanes takes longer, but stops where others
-do."""
+"""Number of runs that count as computed side by side, whatever the processor. A processor with fewer lanes takes
+longer, but stops at equal work."""
 
 FAIR = 2.0
 """Largest part of the remaining work for each of several runs, in units of an equal part."""
@@ -69,7 +69,7 @@ class Allowance:
     def charge(self, steps: np.ndarray, step: float) -> None:
         """Add the work of a batch of runs, from their steps, shape (runs,), and the work of a `step`.
 
-        A run alone counts as much as eight.
+        A single run counts as much as eight.
         """
         work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self

@@ -27,14 +27,16 @@ NO_TABLES = Tables(np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 0, 2)), n
 class Batch(NamedTuple):
     """Inputs of a batch of n runs of one model; a first dimension of 1 is shared by all runs.
 
-    - Constants (n, constants); initial states, and absolute tolerances (n, states). Initial states are followed by the
-      values that a sampled controller holds between samples.
-    - Initial modes, one for each kink of the equations (n, kinks); first and longest steps [s] (n,).
-    - Pieces of the reference (n, pieces + 1, 1 + inputs); the last one only marks the end of the run.
-    - Index of the piece at which the window for extremes opens (n,).
-    - Sample time of the drive, and delay from a sample to its effect [s] (n, 2).
-    - Smallest swing [m] between two turning points for them to be recorded (n,).
-    - Lookup tables of the drive.
+    - `constants` (n, constants).
+    - `starts` and absolute `tolerances` (n, states): initial states are followed by the values that a sampled
+      controller holds between samples.
+    - `modes` (n, kinks): initial modes, one for each kink of the equations.
+    - `first_steps` and `longest` steps [s] (n,).
+    - `segments` (n, pieces + 1, 1 + inputs): pieces of the reference; the last one only marks the end of the run.
+    - `windows` (n,): index of the piece at which the window for extremes opens.
+    - `clocks` (n, 2): sample time of the drive, and delay from a sample to its effect [s].
+    - `least_swings` (n,): smallest swing [m] between two turning points for them to be recorded.
+    - `tables`: lookup tables of the drive.
     """
 
     constants: np.ndarray
@@ -67,10 +69,10 @@ class BatchOptions(NamedTuple):
 
 
 class Results(NamedTuple):
-    """Outputs of the runs.
+    """Outputs of the runs of a batch.
 
     They are statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,), sampled
-    states with the held numbers (n, samples, states + held), and both at the end of the run.
+    states with the held numbers (n, samples, states + held), and states with held numbers at the end of the run.
     """
 
     statistics: np.ndarray
@@ -100,9 +102,9 @@ STATISTICS = (
     "outer_before",
 )
 """Names of the statistics of a run: largest force [N], extremes of the deviation in the window [m], last time outside
-each of the two bands [s], steps attempted and rejected, time reached [s], and longest time [s] to enter the two
-bands at places that the reference left again (infinite: not before the reference left; 0: no such place). Extremes
-and times are NaN for a drive with a clock, whose samples give them."""
+each of the two bands [s], steps attempted and rejected, time reached [s], and for each band the longest time [s] to
+enter it at a place that the reference left again (infinite: not before the reference left; 0: no such place). Extremes
+and times are NaN for a drive with a clock; its samples are examined instead."""
 
 
 class Status(IntEnum):

@@ -1,4 +1,7 @@
-"""Run many stages of one structure: prepare in NumPy, run in lanes and threads, return results chunk by chunk."""
+"""Run many stages of one structure, and return the results chunk by chunk.
+
+Runs are prepared in NumPy, and computed in lanes and threads.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +43,11 @@ MORE = 2
 class RunOptions:
     """Options of runs.
 
-    - Relative tolerance, step budget, and number of threads.
-    - Bands of settling [m]; start of the window for extremes, as a fraction of the run.
-    - Time [s] from which turning points are kept, at most half of the run.
-    - Smallest swing [m] between two of them, one number or one per run: smaller legs of a zigzag are skipped.
-    - Room for turning points at first.
-    - Sampling interval [s] (None: no samples).
-    - A flag, shape (1,): once another thread sets it, no further run begins.
+    They are, in the order of the fields: relative tolerance, step budget, and number of threads; bands of settling [m];
+    start of the window for extremes, as a fraction of the run; time [s] from which turning points are kept, at most
+    half of the run; smallest swing [m] between two turning points, one number or one per run, below which legs of a
+    zigzag are skipped; room for turning points at first; sampling interval [s] (None: no samples); and a flag, shape
+    (1,): once another thread sets it, no further run begins.
     """
 
     rtol: float = 1e-6
@@ -64,7 +65,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Runs:
-    """Results of some runs, with their numbers."""
+    """Results of some runs, with the numbers of the runs."""
 
     numbers: np.ndarray
     results: Results
@@ -88,11 +89,11 @@ def run_chunks(
 ) -> Iterator[Runs]:
     """Run `runs` stages of one structure, in chunks.
 
-    They are given as flat keys to SI numbers or arrays of shape (runs,). They start at rest, displaced as the motion
-    says, or from the states `starts`, shape (runs, states). Modes with memory may follow the states there; otherwise
-    they follow from the states. In a chunk, runs with many turning points come last. Results do not depend on lanes,
-    threads or chunks. A failed run has a status; the others go on. Raises Exhausted if an allowance does not suffice
-    (see `friso.engine.allowance`).
+    Stages are given as flat keys to SI numbers or arrays of shape (runs,). They start at rest, displaced as the motion
+    says, or from the states `starts`, shape (runs, states). In `starts`, modes with memory may follow the states;
+    otherwise they are derived from the states. In a chunk, runs with many turning points come last. Results do not
+    depend on lanes, threads or chunks. A failed run has a status; the others go on. Raises Exhausted if an allowance
+    does not suffice (see `friso.engine.allowance`).
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
@@ -112,7 +113,7 @@ def prepare(
         constants = columns(kernel.module.constants(values), runs)
         scales = columns(kernel.module.scales(values), runs)
         rates = columns(kernel.module.rate(values), runs)[:, 0]
-    scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
+    scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # without any motion, any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
     windows = np.broadcast_to(windows, (runs,)).copy()
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
@@ -169,7 +170,10 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run numbered runs; repeat those with too many turning points, fewer at a time, with more room for each."""
+    """Run the numbered runs.
+
+    Runs with too many turning points are repeated, fewer at a time, with more room for each.
+    """
     part = part_of(flat, numbers)
     least = options.least_swing
     part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
@@ -198,8 +202,8 @@ def _run_with_room(
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
     """Run a batch within the allowance, if there is one.
 
-    Each run gets an equal part of the remaining steps. The few runs for which that does not suffice are repeated with
-    the steps that the others left. Raises Exhausted if these hardly exceed the first part.
+    Each run gets an equal part of the remaining steps. The few runs that need more are repeated with the steps that the
+    others left. Raises Exhausted if these are hardly more than the first part.
     """
     allowance = current_allowance()
     if allowance is None:
@@ -220,7 +224,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
 
 
 def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
-    """Return the runs of a batch with some numbers; common values stay."""
+    """Return a batch with only the numbered runs; values common to all runs stay."""
     if len(which) == len(batch.starts):
         return batch
     own = {
@@ -232,7 +236,7 @@ def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
 
 
 def _empty_like(results: Results, runs: int) -> Results:
-    """Return empty arrays for so many runs, of the sizes of the given results."""
+    """Return empty arrays for `runs` runs, of the sizes of the given results."""
     return empty_results(runs, results.turn_times.shape[1], *results.samples.shape[1:])
 
 
@@ -252,7 +256,7 @@ def options_of(options: RunOptions) -> BatchOptions:
 def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Results, threads: int | None) -> None:
     """Let threads take the runs of a chunk from a queue, without the interpreter's lock.
 
-    Raises Overtaken if nobody waits for them any more.
+    Raises Overtaken if nobody waits for the runs any more.
     """
     go_on()
     workers = min(threads or cores_to_use(), -(-len(batch.starts) // LANES))

@@ -26,7 +26,7 @@ def main(folder: Path) -> None:
         builder, task = asked
         try:
             return import_module(builder).build(folder, task)
-        except OSError as error:  # the disk is full: no fault of what is built, whose traceback would help
+        except OSError as error:  # a full disk is not the fault of the built code, so no traceback helps
             return error
 
     answer_questions(built)

@@ -1,4 +1,4 @@
-"""Compile code that is missing in the cache in separate processes, as many at a time as there are cores.
+"""Compile code that is missing in the cache, in separate processes, one per core at a time.
 
 With separate processes, the running code is always loaded from the cache. A command that finds everything compiled
 loads neither SymPy nor a compiler's front end.
@@ -36,7 +36,7 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """Return the requested cache entries, and build missing ones, with messages in the log.
 
     Raises RuntimeError with the builder's message if that fails, OSError if no folder can be written, and Overtaken if
-    nobody waits for them any more; builds in progress are then finished for later requests.
+    nobody waits for the entries any more; builds in progress are then finished for later requests.
     """
     requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
@@ -100,7 +100,7 @@ class _Work:
             job = self._jobs.get(request)
             if job is None or job.given_up:
                 job = _Job(request, place, self._cores)
-                Thread(target=self._do, args=[job], daemon=True).start()  # it keeps nobody from leaving
+                Thread(target=self._do, args=[job], daemon=True).start()  # a daemon does not keep the process alive
                 self._jobs[request] = job
             job.waiting += 1
             return job
@@ -111,7 +111,7 @@ class _Work:
             for job in jobs:
                 job.waiting -= 1
             left = [job for job in jobs if not job.waiting and not (overtaken and job.builds)]
-            for job in left:  # all, before any has ended: a builder that starts now ends itself
+            for job in left:  # mark all before ending any: a builder that starts now then ends itself
                 job.give_up()
         return left
 
@@ -154,7 +154,7 @@ def _wait(jobs: list[_Job]) -> None:
 class _Job:
     """A request to build a cache entry, in progress.
 
-    `place` is its number among all, `waiting` the number of waiting threads, `builds` tells whether it is being built,
+    `place` is its rank in the queue, `waiting` the number of waiting threads, `builds` tells whether it is being built,
     and `given_up` whether it was abandoned.
     """
 
@@ -167,7 +167,7 @@ class _Job:
 
     def give_up(self) -> None:
         """Abandon the job as soon as possible."""
-        self.given_up = True  # before the builder is ended: one that starts now ends itself
+        self.given_up = True  # set before the builder is ended: a builder that starts now then ends itself
         if builder := self._builder:
             builder.kill()
 
@@ -179,15 +179,15 @@ class _Job:
             logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
 
     def meet(self) -> None:
-        """Fulfil the request."""
+        """Fulfil the request, unless another process has done so meanwhile."""
         with self._held(self.request.lock()):
-            if self.request.entry() is None:  # no other process has built it meanwhile
+            if self.request.entry() is None:  # another process may have built it meanwhile
                 with self._core():
                     self.request.answer(self._built())
 
     @contextmanager
     def _held(self, lock: FileLock) -> Iterator[None]:
-        """Hold the lock of the request, once no other process does."""
+        """Hold the lock of the request, waiting until no other process holds it."""
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -228,7 +228,7 @@ class _Job:
                 return name
             message = builder.end()
             self._go_on()
-            if waiting is None:  # one that has waited may have ended meanwhile
+            if waiting is None:  # an idle builder may have ended meanwhile
                 raise RuntimeError(f"the kernel could not be compiled:\n{message}")
 
 

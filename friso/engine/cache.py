@@ -58,7 +58,7 @@ DAY = 86_400.0
 def cache_folder() -> Path:
     """Return the folder of compiled code, mode 0700.
 
-    If that is not possible, it is a temporary one, with a warning.
+    If it cannot be made, the result is a temporary folder, with a warning.
     """
     try:
         for error in _UNWRITABLE:
@@ -68,7 +68,7 @@ def cache_folder() -> Path:
         make_private(folder)
         with locked_folder(folder, "trial-", "lock"):
             return folder
-    except (OSError, RuntimeError) as error:  # the latter of a user without a home
+    except (OSError, RuntimeError) as error:  # RuntimeError: a user without a home
         logger.warning(
             "kernels are compiled into a temporary folder and not kept: %s; %s names another folder",
             _in_words(error),
@@ -86,14 +86,14 @@ _UNWRITABLE: list[OSError] = []
 
 
 def leave_cache(folder: Path, error: OSError) -> None:
-    """Compile kernels into a temporary folder from now on, because this one cannot be written.
+    """Compile kernels into a temporary folder from now on, because `folder` cannot be written.
 
     Its disk may be full. Raises the error if the folder is already temporary.
     """
     if is_passing(folder):
         raise error
     with _LEAVING:
-        if cache_folder() == folder:  # no other thread has left it meanwhile
+        if cache_folder() == folder:  # unless another thread has left it meanwhile
             _UNWRITABLE[:] = [error]
             cache_folder.cache_clear()
 
@@ -125,7 +125,10 @@ def remove_if_passing(folder: Path) -> None:
 
 @cache
 def code_digest(*parts: str) -> str:
-    """Return a digest of the sources in these folders and files, given by paths from the package friso."""
+    """Return a digest of the sources in some folders and files.
+
+    Their paths start from the package friso.
+    """
     code = hashlib.sha256()
     for part in parts:
         place = Path(__file__).parent.parent / part
@@ -165,7 +168,7 @@ class CodeRequest:
     """Request to compile code.
 
     It has the full `name`, a `title` for messages, and the task. `build(folder, task)` of its module stores the code in
-    the cache (`keep`) and returns the name of the entry. The digests of loaded plug-ins belong to it.
+    the cache (`keep`) and returns the name of the entry. The request also holds the digests of loaded plug-ins.
     """
 
     name: str
@@ -181,7 +184,7 @@ class CodeRequest:
         return cache_folder() / f"{_digest(*asked)}{REQUEST}"
 
     def lock(self) -> FileLock:
-        """Return the lock of the request, which requests for other code may share."""
+        """Return the lock of the request; requests for other code may share it."""
         return FileLock(cache_folder() / f"{self.file.name[:2]}.request-lock", mode=0o600)
 
     def answer(self, name: str) -> None:
@@ -232,12 +235,15 @@ def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> s
 
 
 def entry_lock(file: Path) -> FileLock:
-    """Return the lock for writing or deleting an entry; entries may share one."""
+    """Return the lock for writing or deleting an entry; several entries may share it."""
     return FileLock(file.parent / f"{file.name[:2]}.lock", mode=0o600)
 
 
 def _without_words(source: str) -> str:
-    """Return a module's bytecode without comments, docstrings and line numbers, which thus change nothing."""
+    """Return a module's bytecode without comments, docstrings and line numbers.
+
+    A change of these alone thus compiles nothing anew.
+    """
     return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
 
 
@@ -247,14 +253,14 @@ def _plain(part: object) -> object:
         names = (part.co_name, part.co_names, part.co_varnames, part.co_freevars, part.co_cellvars)
         takes = (part.co_argcount, part.co_posonlyargcount, part.co_kwonlyargcount, part.co_flags)
         return names, takes, part.co_code, part.co_exceptiontable, [_plain(constant) for constant in part.co_consts]
-    if isinstance(part, frozenset):  # in an order of its own in each process
+    if isinstance(part, frozenset):  # its own order differs in each process
         return sorted(map(repr, part))
     return [_plain(one) for one in part] if isinstance(part, tuple) else part
 
 
 @cache
 def _compiled_with() -> str:
-    """Return a digest of the modules of friso that compiled code includes."""
+    """Return a digest of the modules of friso whose code is part of compiled code."""
     files = (Path(__file__).parent / f"{name}.py" for name in _INCLUDED)
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 

@@ -66,8 +66,8 @@ def run_driven(
 ) -> Iterator[DrivenRuns]:
     """Run driven stages of one structure from the states `starts`, in chunks.
 
-    The stages are given as flat keys to SI numbers or arrays of shape (runs,); `starts` has the shape (runs, kept). A
-    failed run is NaN from there on, and has its status.
+    The stages are given as flat keys to SI numbers or arrays of shape (runs,); `starts` has the shape (runs, kept). The
+    states of a failed run are NaN from the failure on, and the run has its status.
     """
     count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
     options = RunOptions(

@@ -1,7 +1,7 @@
-"""Keep all lanes busy: load runs, serve the lanes that need attention, refill a lane as its run ends.
+"""Keep all lanes busy: load runs, serve lanes that need attention, refill a lane as its run ends.
 
-Compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a model are in
-its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
+This code is compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a
+model are in its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
 """
 
 from math import pi
@@ -64,7 +64,7 @@ def deviation_rate(B, layout, lane, theta):
 def find_turn(B, layout, lane, high):
     """Return the fraction in (0, high) of the step at which the deviation turns.
 
-    It is found by bisection, sped up by the secant (Illinois).
+    Bisection finds it, sped up by the secant (Illinois).
     """
     low, f_low, f_high = 0.0, deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, high)
     theta, side = high, 0
@@ -105,7 +105,7 @@ def moment(B, layout, lane, theta):
 def note_entry(B, layout, lane, row, fraction, start, end, band):
     """Refine the time at which the deviation last entered the band, within a step.
 
-    `row` is where it is stored; the deviation came back between start and end.
+    `row` is where the time is stored; the deviation came back between `start` and `end`.
     """
     if abs(start) > band and abs(end) <= band:
         theta = find_entry(B, layout, lane, fraction, band)
@@ -137,8 +137,8 @@ def note_turn(B, layout, lane, fraction, batch, settings, results):
 def keep_turn(B, layout, lane, kind, time, value, least, results):
     """Store a maximum (kind 1) or minimum (-1) of a zigzag with legs of at least `least`.
 
-    An extremum that follows another of its kind, with only smaller swings in between, replaces it if it goes beyond.
-    Extrema without room are only counted.
+    If it follows another extremum of its kind, with only smaller swings in between, it replaces that one if it goes
+    beyond. Extrema without room are only counted.
     """
     j, count = int(B[ROW.run * layout.lanes + lane]), int(B[ROW.turns * layout.lanes + lane])
     times, values, last = results.turn_times[j], results.turn_values[j], count - 1
@@ -191,9 +191,9 @@ def reference_of(batch, j):
 
 
 def enter_segment(B, layout, lane, j, segment, batch):
-    """Start the next segment of the reference that has a duration, or the last one, which ends the run.
+    """Start the next piece of the reference that has a duration, or the last one, which ends the run.
 
-    One segment opens the window over which the extremes of the deviation are taken.
+    One piece opens the window over which the extremes of the deviation are taken.
     """
     segments = batch.segments[reference_of(batch, j)]
     count = segments.shape[0] - 1
@@ -226,7 +226,7 @@ def enter_segment(B, layout, lane, j, segment, batch):
 
 
 def walk(B, layout, lane, w):
-    """Return a lane's place along the axis of its tables, in points: by a state, or by time."""
+    """Return where a lane is along the axis of its tables, in points: at a state, or a time."""
     timed = w == layout.place_states.size
     axis = (layout.axis + (AXIS_ROWS if timed else 0)) * layout.lanes + lane
     if timed:
@@ -238,7 +238,7 @@ def walk(B, layout, lane, w):
 
 
 def look_up(B, layout, lane, j, tables):
-    """Look up the table cells of a lane, unless it has not left them."""
+    """Look up the table cells of a lane, if the lane has left its old ones."""
     for w in range(layout.place_states.size + 1):
         place, cell = walk(B, layout, lane, w), (layout.cell + w) * layout.lanes + lane
         if place >= B[cell] and place <= B[cell] + 1.0:
@@ -254,9 +254,9 @@ def look_up(B, layout, lane, j, tables):
 
 
 def looked_up(layout, j, i, point, tables):
-    """Return one point of table i for run j: a table over places, or over time.
+    """Return one point of table i for run j.
 
-    All runs may share one set of tables.
+    Tables run over places or over time, and all runs may share one set.
     """
     if i < layout.places:
         return tables.places[min(j, tables.places.shape[0] - 1), i, point]
@@ -272,7 +272,7 @@ def note_tick(B, layout, lane, settings, results):
 
 
 def take_samples(B, layout, batch, settings, results):
-    """Take the sample of every lane that has reached one."""
+    """Take the sample of every lane that has reached a sampling instant."""
     wanting = call_at(layout.locate, B) if layout.clocked else 0
     if wanting:
         for lane in range(layout.lanes):
@@ -309,7 +309,7 @@ def load_run(B, layout, lane, j, batch, settings):
 
 
 def start_clock(B, layout, lane, j, batch):
-    """Take the first sample at the start, whose results act at once or after the delay."""
+    """Take the first sample of a run, whose results act at once or after the delay."""
     late, tables = batch.clocks[j, 1], batch.tables
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late
@@ -342,7 +342,7 @@ def start_run(B, layout, lane, j, batch, settings, results):
 
 
 def idle(B, layout, lane):
-    """Keep a lane without a run at rest beside the others."""
+    """Keep a lane without a run at rest, while the other lanes go on."""
     B[ROW.run * layout.lanes + lane] = -1.0
     B[ROW.stop * layout.lanes + lane] = np.inf
     B[ROW.record_from * layout.lanes + lane] = np.inf
@@ -368,10 +368,10 @@ def answer(B, layout, lane, batch, settings, results):
 
 
 def next_segment(B, layout, lane, j, batch):
-    """Go to the next segment of the reference.
+    """Go to the next piece of the reference.
 
-    If the reference leaves a place at which it stood, note how long the run took to settle there, if that was the
-    longest so far.
+    If the reference leaves a place at which it stood, the time that the run took to settle there is stored, if it is
+    the longest so far.
     """
     stood, now = stands(B, layout, lane), B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
     enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
@@ -445,7 +445,7 @@ def refill(B, layout, lane, queue, batch, settings, results):
 
 
 def run(B, layout, queue, batch, settings, results):
-    """Run the runs of this thread's share of the queue in lanes, and write results."""
+    """Run this thread's share of the queue in lanes, and write the results."""
     busy = 0
     for lane in range(layout.lanes):
         if refill(B, layout, lane, queue, batch, settings, results):

@@ -1,7 +1,7 @@
 """Write Gaussian elimination of a matrix with known zeros as straight-line code.
 
-Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides the number of operations and
-their waiting times; it is searched, starting from Markowitz's rule.
+Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides how many operations there are,
+and how long each waits for others; it is searched, starting from Markowitz's rule.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ class Elimination:
 def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
     """Eliminate a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal, symbolically.
 
-    Rows not in `diagonal` have only ``diagonal`` on the diagonal, whose inverse is ``inverse``. The pivot order is
-    improved by exchanging two pivots until no exchange helps, for one factorisation and `solves` solutions.
+    Rows not in `diagonal` have only the common entry ``diagonal`` on the diagonal, whose inverse is ``inverse``. The
+    pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves` solutions
+    cheaper.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)
@@ -81,7 +82,7 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
     """Return the estimated cycles of a factorisation and `solves` solutions.
 
-    They are the longest wait, and a part of every operation.
+    They are the longest chain of waiting, and a part of every operation.
     """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0

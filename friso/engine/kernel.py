@@ -32,13 +32,13 @@ from friso.stage.tables import friction_law
 
 KernelForm = Structure | Imposed | Driven | AsBuilt
 """Forms for which a kernel can be made: stages, friction under an imposed motion, stages that follow a log, and stages
-with their drive as built."""
+with their real drive."""
 
 
 STEP, OPERATION, CALL = 3.5, 0.0011, 0.126
 """Work of a step of a run (see `friso.engine.allowance`): a constant, a term for each operation in its source, and one
-for each call of a function such as an exponential. Fitted to 33 kernels on 25 November 2026, to 30 %; they take 63
-to 280 ns a step."""
+for each call of a function such as an exponential. They were fitted on 25 November 2026 to 33 kernels, which take 63 to
+280 ns a step, and match them to 30 %."""
 
 _STEP = re.compile(r"^def step\(.*?(?=^def |\Z)", re.DOTALL | re.MULTILINE)
 _OPERATIONS = re.compile(r"[-+*/]")
@@ -62,7 +62,7 @@ class Kernel:
     def work(self) -> float:
         """Return the work of a step of a run, counted in operations.
 
-        It is the same on every machine.
+        It is equal on every machine.
         """
         step = "".join(_STEP.findall(self.source))
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
@@ -110,7 +110,7 @@ class Kernel:
         return self.module.CART_VELOCITY
 
     def having(self, role: Role) -> list[int]:
-        """Return the indices of states and held numbers with a role."""
+        """Return the indices of states and held numbers that have a `role`."""
         return [i for i, state_role in enumerate(self.module.ROLES) if state_role == role]
 
     @property
@@ -130,9 +130,9 @@ class Kernel:
 
     @property
     def initial_size(self) -> int:
-        """Return how many numbers of `full_state` a run starts from.
+        """Return how many numbers of `full_state` a run needs to start from.
 
-        Modes with memory may follow from them.
+        Modes with memory may be derived from them.
         """
         return len(self.full_state) - len(self.switches)
 
@@ -147,7 +147,7 @@ class Kernel:
 
     @property
     def outputs(self) -> dict[str, tuple[str, str]]:
-        """Return unit and label of each output."""
+        """Return the unit and the label of each output, by name."""
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
@@ -177,8 +177,8 @@ class Kernel:
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
         """Return the side of each kink on which runs are, 1 beyond and 0 before, shape (kinks, ...).
 
-        `full` is the full state, or the states alone, (..., ). Modes with memory are taken from it; without them they
-        are those in which a run begins in that state.
+        `full` is the full state, or the states alone, (..., ). Modes with memory are taken from the full state; from
+        states alone they are those in which a run begins.
         """
         sides = self.module.surfaces(full[: len(self.states)], time, reference, values)
         modes = np.zeros((len(self.kinks), *full.shape[1:]))
@@ -189,7 +189,7 @@ class Kernel:
         return modes
 
     def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
-        """Return starts with their modes with memory, as a run would begin in these states.
+        """Append to starts the modes with memory in which runs begin.
 
         `starts` has the shape (runs, initial_size), or is complete already.
         """
@@ -228,7 +228,7 @@ class KernelRequest:
 
     @property
     def title(self) -> str:
-        """Return the form in a few words."""
+        """Describe the form in a few words."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         words = [form.title if isinstance(form, Structure) else f"{form.friction} friction"]
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
@@ -267,7 +267,7 @@ def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:
     requests = list(requests)
     missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
     if missing:
-        missing.sort(key=lambda request: not request.variational)  # these take longest
+        missing.sort(key=lambda request: not request.variational)  # variational kernels take longest
         for request, entry in zip(missing, built_entries([DRIVER, *map(_request, missing)])[1:], strict=True):
             _load(request, entry)
     return [_kernels[request] for request in requests]

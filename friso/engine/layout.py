@@ -1,5 +1,7 @@
-"""Lay out the numbers of the lanes in one flat float64 buffer, row by row,
-the lanes of a row side by side."""
+"""Lay out the numbers of all lanes in one flat float64 buffer.
+
+The buffer has one row after another, and a row has its lanes side by side.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from itertools import accumulate
 from friso.engine.processor import processor
 
 LANES = processor().lanes
-"""Number of runs side by side: one register of float64."""
+"""Number of runs side by side: the float64 that fit one register."""
 
 SCALARS = (
     "time",
@@ -101,9 +103,8 @@ BLOCKS = (
 """Names of blocks of rows whose first row depends on the model; the buffer ends after the last."""
 
 ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", "stands_since", *LOOKED_UP, *FUNCTIONS))
-"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions.
-
-One further row holds the time since which the reference stands."""
+"""Layout of a model for the driver: sizes, first rows of blocks, arrays, and addresses of functions. One further row
+holds the time since which the reference stands."""
 
 
 @dataclass(frozen=True)

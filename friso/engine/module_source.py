@@ -33,7 +33,7 @@ from friso.engine.simd_math import clipped, exp, gaussian, power, quantised, sin
 
 
 _LOG = "from friso.engine.simd_math import log"
-"""Import for modules with the derivative of a power by its exponent."""
+"""Import for modules that differentiate a power by its exponent."""
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
@@ -91,9 +91,9 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return the indices of states that a sampled drive measures, and over which its tables are looked up.
+    """Return the indices of states that a sampled drive measures, and of those that enter its tables.
 
-    Also returns, for each table, the index of that state.
+    Also returns, for each table, the index of the state over which it is looked up.
     """
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()

@@ -1,7 +1,7 @@
 """End work that nobody waits for, and let urgent work of the app go first.
 
-Whoever asks for work has a flag, which another thread sets to cancel it. Runs are incomplete once the flag is set, so
-nothing is made of them: `Overtaken` is raised at the next batch of runs, through all error handling.
+Whoever asks for work has a flag, which another thread sets to cancel the work. Runs are incomplete once the flag is
+set, so nothing may use them: `Overtaken` is raised at the next batch of runs, and passes through all error handling.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ASKER: ContextVar[object] = ContextVar("asker", default=None)
 
 
 def current_flag() -> np.ndarray:
-    """Return the flag that cancels runs: that of `ended_by`, or an unset one."""
+    """Return the flag that cancels runs: the one given to `ended_by`, or an unset one."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 
@@ -55,7 +55,7 @@ def go_on() -> None:
 
 
 AHEAD = 0.5
-"""Longest time [s] for which a question has priority. A longer one is no longer watched, and the compilation of its
+"""Longest time [s] for which a question has priority. After that, nobody is still watching, and the compilation of its
 kernel must not keep others waiting."""
 
 _FIRST: ContextVar[bool] = ContextVar("first", default=False)

@@ -13,7 +13,7 @@ Rename = Callable[[sp.Symbol], str]
 
 
 class reciprocal(sp.Function):
-    """Reciprocal 1/x, separate from powers so that x^-1 and x^-2 share one division."""
+    """Reciprocal 1/x, kept apart from powers so that x^-1 and x^-2 share one division."""
 
 
 def reciprocals(expr: Any) -> Any:
@@ -66,7 +66,8 @@ class _KernelPrinter(PythonCodePrinter):
         return f"power({text}, {self._print(exponent)})"
 
     def _print_re(self, expr: sp.re) -> str:
-        return self._print(expr.args[0])  # everything is real: abs(exp(x)) is exp(re(x)) where SymPy cannot tell of x
+        # all symbols are real, which SymPy does not know: its abs(exp(x)) is exp(re(x))
+        return self._print(expr.args[0])
 
     def _print_Mul(self, expr: sp.Mul) -> str:
         return "(" + " * ".join(f"({self._print(factor)})" for factor in expr.args) + ")"
@@ -95,7 +96,7 @@ class _Renamed(NumPyPrinter):
         return f"np.clip({value}, -({limit}), {limit})"
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
-        """Print cases as nested `where`, which is faster than the `select` of SymPy."""
+        """Print cases as nested `where`, which is faster than the `select` that SymPy prints."""
         text = "np.nan"
         for case in reversed(expr.args):
             result, condition = case.args

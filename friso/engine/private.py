@@ -24,12 +24,12 @@ def make_private(folder: Path) -> None:
     """
     folder = folder.absolute()
     for path in [*reversed(folder.parents), folder]:
-        if not os.path.lexists(path):  # of the root some systems say something else than that it exists
+        if not os.path.lexists(path):  # for the root folder some systems report another error than that it exists
             with suppress(FileExistsError):
                 path.mkdir(mode=0o700)
         status = path.lstat()
         if stat.S_ISLNK(status.st_mode) and path.parent == Path(path.anchor):
-            status = path.stat()  # the system's own, as /var is on macOS
+            status = path.stat()  # links of the system itself, as /var on macOS
         if stat.S_ISLNK(status.st_mode):
             raise PermissionError(f"{path} is a symbolic link")
         if not stat.S_ISDIR(status.st_mode):

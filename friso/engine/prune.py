@@ -18,8 +18,7 @@ KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
 def prune(folder: Path) -> None:
     """Delete compiled code that has not been used for long, and leftovers of killed processes.
 
-    If the folder is still too large, the code unused for longest is deleted next. Files that another process is writing
-    stay.
+    If the folder is still too large, the code unused for longest goes next. Files that another process is writing stay.
     """
     try:
         with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
@@ -30,12 +29,12 @@ def prune(folder: Path) -> None:
                 unfinished = file.suffix == PARTIAL and age > DAY
                 if unfinished or age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
                     _delete(file)
-    except (Timeout, OSError) as error:  # another process is at it; it is no reason to stop
+    except (Timeout, OSError) as error:  # another process is pruning, too
         logger.debug("old kernels are left: %s", error)
 
 
 def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
-    """Yield the last use of each entry, request and draft [s], with its path and size [bytes]."""
+    """Yield each entry, request and draft: time of its last use [s], path, and size [bytes]."""
     for file in folder.iterdir():
         if file.suffix in (ENTRY, REQUEST, PARTIAL):
             status = file.lstat()

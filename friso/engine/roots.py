@@ -1,6 +1,6 @@
-"""Find the first zero of a kink's surface inside a step, from its values at the ends and thirds, as straight-line code.
+"""Find the first zero of a kink's surface inside a step, as straight-line code.
 
-`friso.engine.vector_code` compiles it.
+Values at the ends and thirds of the step fix a cubic. `friso.engine.vector_code` compiles the code.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ def bracket(p0, p1, p2, p3):
 
 
 def first_guess(p0, p1, p2, p3):
-    """Return approximately where a cubic first falls below zero from p0 > 0, by a secant; else 2."""
+    """Return approximately where a cubic first falls below zero from p0 > 0; 2 if it does not.
+
+    The guess is that of a secant.
+    """
     low, high, above, below = bracket(p0, p1, p2, p3)
     guess = low + (high - low) * above / (above - below)
     return guess if high < 2.0 else 2.0

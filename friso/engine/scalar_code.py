@@ -1,12 +1,13 @@
 """Compile plain Python loops over numbers and arrays.
 
-The driver of the lanes and the scan of turning points are loops that branch, of a few hundred lines. A general compiler
-of Python needs seconds for them, because it has to infer types. Here types follow from the arguments of a call.
+The driver of the lanes and the scan of turning points are loops with branches, of a few hundred lines. A general
+compiler of Python needs seconds for them, because it has to infer types. Here types follow from the arguments of a
+call.
 
-The language has functions of whole numbers, float64 numbers, truths, arrays and named tuples of these; assignments,
-arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, `return` of a number. Imported constants are
-evaluated in advance. A variable stays of one kind; arrays are indexed in full, or by their first index, from 0 on and
-within their bounds, which is not checked.
+The language has functions of whole numbers, float64 numbers, truth values, arrays, and named tuples of these. It has
+assignments, arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, and `return` of a number. Imported
+constants are evaluated in advance. A variable stays of one kind; arrays are indexed in full, or by their first index,
+from 0 on and within their bounds, which is not checked.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
 def _types(kind: CompiledKind) -> Sequence[ir.Type]:
-    """Return LLVM's types of a value.
+    """Return the LLVM types that represent a value.
 
     A number has one; an array has an address and a shape, a named tuple an address.
     """
@@ -64,7 +65,7 @@ def take_next(queue: Any) -> Any:
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
     """Call a function written by `friso.engine.vector_code`; return the bits of its lanes.
 
-    `address` is where it lies.
+    `address` is the function's address.
     """
     raise NotImplementedError
 
@@ -199,10 +200,10 @@ _COMPARISONS: dict[type[ast.AST], str] = {
 
 
 class _Frame(ast.NodeVisitor):
-    """Writer of the statements and expressions of one function for the kinds of its arguments.
+    """Writer of the statements and expressions of one function, for arguments of given kinds.
 
-    A variable with a number is a place in memory, which LLVM turns into registers; one with an array or a named tuple
-    is another name for it. Compile-time values stay Python objects until they meet a number.
+    A variable with a number is a place in memory, which LLVM turns into registers. A variable with an array or a named
+    tuple is another name for it. Compile-time values stay Python objects until they meet a number.
     """
 
     def __init__(self, writer: _Writer, code: ir.Function, scope: dict[str, Any], outside: dict[str, Any]) -> None:
@@ -217,7 +218,7 @@ class _Frame(ast.NodeVisitor):
         self._first = self._code.blocks[1]
 
     def body(self, tree: ast.FunctionDef) -> None:
-        """Write the whole function."""
+        """Write the whole body of the function from its syntax tree."""
         self._statements(tree.body)
         if not self._builder.block.is_terminated:
             self._builder.ret(ir.Constant(_INT64, 0))
@@ -262,7 +263,7 @@ class _Frame(ast.NodeVisitor):
             self.generic_visit(target)
 
     def _bind(self, name: str, value: Any) -> None:
-        """Let a variable be a value; a number is copied into it."""
+        """Bind a variable to a value; a number is copied into it."""
         if isinstance(value, _ArrayValue | _RecordValue):
             self._scope[name] = value
             return
@@ -310,7 +311,7 @@ class _Frame(ast.NodeVisitor):
         self._loop(node, body, test, after)
 
     def visit_For(self, node: ast.For) -> None:
-        """Over a range, or as often as a tuple has parts."""
+        """Write a loop over a range, or over the parts of a tuple."""
         if not (isinstance(node.iter, ast.Call) and self.visit(node.iter.func) is range):
             for part in self.visit(node.iter):
                 self._assign(node.target, part)
@@ -402,7 +403,7 @@ class _Frame(ast.NodeVisitor):
         return _Value(loaded, INT if array.kind.dtype == "int64" else FLOAT)
 
     def _element(self, array: _ArrayValue, node: ast.expr) -> ir.Value:
-        """Return where an element is, or where the part with this first index begins."""
+        """Return the address of an element, or of the first element with this first index."""
         index = node.elts if isinstance(node, ast.Tuple) else [node]
         if len(index) not in (1, len(array.shape)):
             self.generic_visit(node)
@@ -461,7 +462,10 @@ class _Frame(ast.NodeVisitor):
         return _Value(compare(sign, first, second, flags=FASTMATH), TRUTH)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> _Value:
-        """As in Python, what comes later is not looked at where what comes first decides."""
+        """Write `and` or `or`.
+
+        As in Python, later operands are not evaluated if an earlier one decides.
+        """
         after, ends = self._code.append_basic_block(), []
         decisive = ir.Constant(_BIT, int(isinstance(node.op, ast.Or)))
         for operand in node.values[:-1]:
@@ -474,7 +478,7 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._meet(after, ends, _BIT), TRUTH)
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """Write a conditional expression, of which only one side is computed."""
+        """Write a conditional expression; only the chosen side is computed."""
         condition = self.visit(node.test)
         if not isinstance(condition, _Value):
             return self.visit(node.body if condition else node.orelse)
@@ -495,7 +499,10 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._meet(after, ends, ends[0][0].type), kind)
 
     def _meet(self, block: ir.Block, ends: Sequence[tuple[ir.Value, ir.Block]], type_: ir.Type) -> ir.Value:
-        """Go on in a block, to which several ways lead; the value that comes along the way taken."""
+        """Continue in a block to which several branches lead.
+
+        Returns the value from the branch that was taken.
+        """
         self._builder.branch(block)
         self._builder.position_at_end(block)
         value = self._builder.phi(type_)
@@ -553,7 +560,10 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._builder.call(code, [buffer.data, *operands]), INT)
 
     def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
-        """Two numbers of one kind: a float64 number where one of them is."""
+        """Convert two numbers to one kind: float64 if either is.
+
+        Returns both, and the kind.
+        """
         first, second = self._number(left), self._number(right)
         kind = FLOAT if FLOAT in (first.kind, second.kind) else INT
         if first.kind == TRUTH and second.kind == TRUTH:
@@ -561,7 +571,7 @@ class _Frame(ast.NodeVisitor):
         return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
-        """Return a number as one of a kind; whole numbers and truths may become float64."""
+        """Convert a number to a kind; whole numbers and truth values may become float64."""
         if not isinstance(value, _Value):
             own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):
@@ -583,7 +593,7 @@ class _Frame(ast.NodeVisitor):
 
 @dataclass(frozen=True)
 class _Variable:
-    """Storage of a number in a frame."""
+    """Place in a frame where a variable's number is stored."""
 
     room: ir.Value
     kind: NumberKind
@@ -598,4 +608,4 @@ _LIBRARY: dict[Any, Callable[..., _Value]] = {
     take_next: _Frame.take_next,
     call_at: _Frame.call_at,
 }
-"""Functions that are instructions."""
+"""Functions that translate to single instructions."""

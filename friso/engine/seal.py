@@ -1,7 +1,7 @@
 """Seal the files that friso keeps for itself.
 
-An authenticator (HMAC-SHA-256, RFC 2104) by a secret of this user shows that friso wrote a file under exactly this
-name. This holds even where others could once write to the folder.
+An authenticator (HMAC-SHA-256, RFC 2104) with a secret of this user shows that friso wrote a file under exactly this
+name. This holds even if others could once write to the folder.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ def _authenticator(path: Path, content: bytes) -> bytes:
 def _secret(folder: Path) -> bytes:
     """Return the secret of a folder.
 
-    It is a new one if there is none, or if others can have read or written it.
+    A new one is made if there is none, or if others can have read or written it.
     """
     file = folder / SECRET
     if (secret := _stored(file)) is None:
         with FileLock(folder / f"{SECRET}.lock", mode=0o600):
-            if (secret := _stored(file)) is None:  # no other process has made one meanwhile
+            if (secret := _stored(file)) is None:  # unless another process has made one meanwhile
                 secret = os.urandom(LENGTH)
                 write_private(file, secret)
     return secret

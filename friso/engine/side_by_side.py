@@ -1,5 +1,7 @@
-"""Several things computed at once, in as many threads as there are cores: what runs leaves the interpreter to the
-others."""
+"""Compute several things at once, in as many threads as there are cores.
+
+Running code releases the interpreter's lock, so the threads do not wait for each other.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,9 @@ _PATIENCE = 0.1
 
 @dataclass(frozen=True)
 class _Beside:
-    """The tasks among which the present one runs: their number and their jobs.
+    """Tasks that run side by side with the present one: their number and their jobs.
 
-    It also holds what stood beside the task that began them.
+    It also holds the group from which they were started.
     """
 
     tasks: int
@@ -45,7 +47,7 @@ _BESIDE: ContextVar[_Beside | None] = ContextVar("beside", default=None)
 def cores_to_use() -> int:
     """Return how many cores a batch of runs may take now.
 
-    It is all of them, or the batch's share while other tasks run. Fewer threads keep more of their lanes busy.
+    It is all of them, or a share while other tasks run. Fewer threads keep more of their lanes busy.
     """
     beside = _BESIDE.get()
     return beside.cores if beside else usable_cores()
@@ -54,8 +56,8 @@ def cores_to_use() -> int:
 def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
     """Wait for jobs and return their results in order; an error is raised at once.
 
-    Between waits it is checked that someone still waits for all results, and Ctrl-C is noticed, which interrupts no
-    wait on Windows.
+    The wait is interrupted regularly, to check whether someone still waits for the results, and to notice Ctrl-C, which
+    interrupts no wait on Windows.
     """
     while any(not job.done() for job in jobs):
         for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:

@@ -10,7 +10,7 @@ from math import sqrt
 
 import numpy as np
 
-_ROUNDER = 6755399441055744.0  # 1.5 * 2^52: adding it leaves a whole number in the low bits
+_ROUNDER = 6755399441055744.0  # 1.5 * 2^52: the low bits of x + 1.5 * 2^52 are a whole number
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH, _LN2_LOW = 0.6931471803691238, 1.9082149292705877e-10
 _THREE_QUARTERS = 4604930618986332160  # the bits of 0.75
@@ -39,7 +39,7 @@ def exp(x):
     r = (x - rounded * _LN2_HIGH) - rounded * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2
-    p0 = (1.0 + r) + r2 * (1.0 / 2 + r * (1.0 / 6))  # the series in groups that do not wait for each other
+    p0 = (1.0 + r) + r2 * (1.0 / 2 + r * (1.0 / 6))  # the series in independent groups
     p1 = (1.0 / 24 + r * (1.0 / 120)) + r2 * (1.0 / 720 + r * (1.0 / 5040))
     p2 = (1.0 / 40320 + r * (1.0 / 362880)) + r2 * (1.0 / 3628800 + r * (1.0 / 39916800))
     p3 = 1.0 / 479001600 + r * (1.0 / 6227020800)
@@ -76,13 +76,16 @@ def clipped(x, limit):
 
 
 def quantised(x, digit):
-    """Return x rounded to multiples of a step, below 2^51 of them; unchanged for a step of 0."""
+    """Return x rounded to multiples of the step `digit`, unchanged for a step of 0.
+
+    It is exact for fewer than 2^51 steps.
+    """
     rounded = digit * ((x / digit + _ROUNDER) - _ROUNDER)
     return rounded if digit > 0.0 else x
 
 
 def mixed(z):
-    """Return the bits of z well mixed: SplitMix64.
+    """Return the bits of z well mixed, by SplitMix64.
 
     Steele, Lea, Flood 2014, doi:10.1145/2660193.2660195.
     """
@@ -101,10 +104,10 @@ def uniform(bits):
 
 
 def gaussian(seed, tick):
-    """Return a normal deviate for a seed and a tick, whole numbers below 2^51.
+    """Return a normally distributed number for a seed and a tick, whole numbers below 2^51.
 
-    It is by Box and Muller (1958, doi:10.1214/aoms/1177706645): the same on any thread, in any order; up to 7.5 in
-    size.
+    By Box and Muller (1958, doi:10.1214/aoms/1177706645). The number is at most 7.5 in size, and equal on any thread
+    and in any order.
     """
     key = mixed(np.uint64(bits_of(seed + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
     bits = mixed(key + np.uint64(bits_of(tick + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
@@ -113,7 +116,10 @@ def gaussian(seed, tick):
 
 
 def quarter_sine(turn):
-    """Return sin(2 pi turn) within a quarter of a turn to either side; absolute error below 1e-11."""
+    """Return sin(2 pi turn) for at most a quarter turn to either side.
+
+    The absolute error is below 1e-11.
+    """
     x = 6.283185307179586 * turn
     q = x * x
     p = -1.0 / 39916800 + q * (1.0 / 6227020800 - q * (1.0 / 1307674368000))
@@ -121,7 +127,10 @@ def quarter_sine(turn):
 
 
 def sine(turn):
-    """Return sin(2 pi turn) for up to 2^50 turns, with an absolute error below 1e-11, plus the rounding of the turn."""
+    """Return sin(2 pi turn) for up to 2^50 turns.
+
+    The absolute error is below 1e-11, plus the rounding of the turn.
+    """
     quarter_later = turn + 0.25
     within = quarter_later - ((quarter_later - 0.5 + _ROUNDER) - _ROUNDER)  # 0 to 1
     return quarter_sine(0.25 - abs(within - 0.5))

@@ -74,7 +74,7 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
     """Return the model's outputs as variables over "time".
 
-    They follow from states, shape (states, samples), at the times [s].
+    They are computed from states, shape (states, samples), at the times [s].
     """
     arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {

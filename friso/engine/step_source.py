@@ -1,7 +1,7 @@
-"""Write one Rosenbrock step of a model as straight-line code for one lane (`friso.engine.vector_code`).
+"""Write one Rosenbrock step of a model as straight-line code for one lane.
 
-Modes (on which side of each kink) are held during a step, so that the right-hand side is smooth; a step that crosses a
-kink is accepted up to the crossing, which the dense output locates.
+`friso.engine.vector_code` compiles the code. Modes (on which side of each kink) are held during a step, so that the
+right-hand side is smooth. A step that crosses a kink is accepted up to the crossing, which the dense output locates.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ POINTS = ("near", "third", "far", "last")
 """Names of a kink's surface at the start, the thirds and the end of a step."""
 
 HYSTERESIS = 3e-3
-"""Distance beyond a kink, over the tolerance, at which it counts as crossed. A lane that has crossed it is then clear
-of it, and rounding noise crosses nothing."""
+"""Distance beyond a kink, over the tolerance, at which it counts as crossed. A lane that has crossed a kink is then
+clear of it, and rounding noise crosses nothing."""
 
 
 SAFETY = 0.77
@@ -38,9 +38,9 @@ AFTER_KINK = 0.25
 
 
 WIDE = 3.0
-"""Distance of a step's start from a kink, in widths of the narrow peak about it, beyond which a step that crosses the
-kink and ends beyond the peak, or on this side again, is repeated up to the kink: all of its stages may lie beyond
-the peak."""
+"""Distance of a step's start from a kink, in widths of the narrow peak about the kink. A step from farther off that
+crosses the kink and ends beyond the peak, or on this side again, is repeated up to the kink, because all of its stages
+may lie beyond the peak."""
 
 ROUNDING = 2e-15
 """Least hysteresis over the terms of a surface, nine units in their last place."""
@@ -52,10 +52,10 @@ UNWATCHED = ("old_time", "taken", "deviation_max", "deviation_min", "inner_exit"
 """Rows that a model with a clock does not use, because its samples are examined instead."""
 
 NO_SWING = 1e-6
-"""Rate over the velocity's tolerance below which a deviation turns by rounding only."""
+"""Rate, over the velocity's tolerance, below which a deviation turns only by rounding."""
 
 HAPPENED = "entered | turned | (now >= next_sample)"
-"""Events that need attention besides the end of a piece of the reference, as an expression."""
+"""Condition under which a lane needs attention, besides the end of a piece of the reference."""
 
 DIVERGED = 1e6
 """Deviation at which a run ends as diverged, in length scales of the motion."""
@@ -205,7 +205,7 @@ class StepWriter:
         return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
-        """Return the distance of each quantity from the beginning of its table cell, in cells."""
+        """Return the code for the distance of each quantity from the beginning of its table cell, in cells."""
         lines = []
         for w, x in enumerate(self._walks):
             first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
@@ -241,9 +241,9 @@ class StepWriter:
         return _function("update", "B", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
-        """Return the piece of the reference in which the sample was taken.
+        """Return the code that finds the piece of the reference in which the sample was taken.
 
-        It is the previous one if a corner came in between.
+        It is the previous piece if a corner came in between.
         """
         length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
         lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
@@ -279,9 +279,9 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """Return the code that chooses the next step, at most to the corner of the reference or to the next tick.
+        """Return the code that chooses the next step, at most to the corner of the reference or the next tick.
 
-        The last two steps before that are made equal.
+        The last two steps before that point are made equal.
         """
         return [
             *self._edge(),
@@ -437,7 +437,7 @@ class StepWriter:
         ]
 
     def _passed_over(self) -> list[str]:
-        """Write the test whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
+        """Write the test for whether the step may have `passed_over` a narrow peak about a kink."""
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
@@ -461,9 +461,9 @@ class StepWriter:
         return lines if self.model.switches else lines + flips
 
     def _step_factor(self) -> list[str]:
-        """Return SAFETY / error^(1/order), from the mean square error, by roots alone.
+        """Write the factor on the step, SAFETY / error^(1/order), from the mean square error.
 
-        The exponent 3/32 stands for 1/10.
+        It uses roots alone: the exponent 3/32 stands for 1/10.
         """
         lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
         if self.tableau.order == 4:
@@ -506,7 +506,8 @@ class StepWriter:
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
             f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
-            "turned = turned & swing & ((now >= record_from) | (off <= outer))",  # others change no result
+            # other turning points change no result
+            "turned = turned & swing & ((now >= record_from) | (off <= outer))",
         ]
 
     def _seen(self) -> list[str]:

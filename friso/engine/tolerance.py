@@ -1,4 +1,4 @@
-"""Check the relative tolerance."""
+"""Check the relative tolerance that a user gives."""
 
 from __future__ import annotations
 

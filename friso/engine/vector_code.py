@@ -34,13 +34,12 @@ CACHE_LINE = 64
 
 
 def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
-    """Compile functions to LLVM code under these names, for so many lanes at once.
+    """Compile functions to LLVM code under given names, for `lanes` lanes at once.
 
     An original `(B, *numbers)` works on a column of numbers B[row]. The compiled function does so in every lane of a
-    flat float64 buffer, in which the lanes of a row lie side by side; the numbers are common to all lanes.
-
-    It takes the buffer's address and the numbers. It returns a whole number whose bit k is set if the original would
-    return true for lane k.
+    flat float64 buffer, in which the lanes of a row lie side by side; the numbers are common to all lanes. It takes the
+    buffer's address and the numbers, and returns a whole number whose bit k is set if the original would return true
+    for lane k.
     """
     module = ir.Module()
     for name, function in functions.items():
@@ -49,11 +48,11 @@ def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.M
 
 
 def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int) -> None:
-    """Add a function to an LLVM module, written as vector instructions for so many lanes."""
+    """Add a function to an LLVM module, written as vector instructions for `lanes` lanes."""
     numbers = [_FLOAT.element] * (len(syntax(function).args.args) - 1)
     signature = ir.FunctionType(_SIGNED.element, [ir.PointerType(_FLOAT.element), *numbers])
     code = ir.Function(module, signature, name)
-    code.attributes.add("nounwind")  # without another attribute the next one is not written
+    code.attributes.add("nounwind")  # LLVM writes the next attribute only after another one
     code.attributes.alignstack = CACHE_LINE
     builder: Any = ir.IRBuilder(code.append_basic_block())
     buffer, *scalars = code.args
@@ -154,9 +153,9 @@ class _Writer:
         return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, constant)] * self.lanes), kind)
 
     def together(self, *operands: Any) -> tuple[list[ir.Value], _Kind]:
-        """Return vectors and numbers as values of one kind, and that kind.
+        """Convert vectors and numbers to one kind; return them and the kind.
 
-        Numbers become of the kind of the vectors.
+        Numbers take the kind of the vectors.
         """
         kinds = [operand.kind for operand in operands if isinstance(operand, _Vector)]
         truths = all(isinstance(operand, bool) for operand in operands)

@@ -1,1 +1,1 @@
-"""The physics, declared once as symbols, and which of it a stage needs."""
+"""Declare the physics once, as symbols, and find which parts of it a stage needs."""

@@ -1,4 +1,7 @@
-"""The drive as built: it samples, waits, quantises and saturates; motor, cable, rail and floor are real."""
+"""Declare a stage with its real drive, surroundings and rail.
+
+The drive samples, waits, quantises and saturates; motor, cable, rail and floor are imperfect.
+"""
 
 from __future__ import annotations
 
@@ -17,32 +20,30 @@ if TYPE_CHECKING:
     from friso.equations.model import Control, Model
 
 STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
-"""Names of the factors that are looked up by position at every sample.
-
-They multiply the cart's static friction, its Coulomb friction, and the stage's motor constant."""
+"""Names of the friction and motor factors that are looked up by position at every sample. They multiply the cart's
+static friction, its Coulomb friction, and the stage's motor constant."""
 
 INJECTED, FLOOR = TIMES = ("injected_force", "floor_acceleration")
-"""Names of the signals that are looked up by time at every sample.
-
-They are a force [N] added to the command, and the acceleration of the floor [m/s^2]."""
+"""Names of the signals that are looked up by time at every sample: a force [N] added to the command, and the
+acceleration of the floor [m/s^2]."""
 
 
 READING, COMMANDED = "reading", "commanded"
-"""Names of the logged numbers of a drive: the encoder's reading [m] and the commanded force [N]."""
+"""Names of the quantities that a drive logs: the encoder's reading [m] and the commanded force [N]."""
 
 RATED = "seen_rated"
-"""Name of the position at the velocity encoder, where the drive has a separate one."""
+"""Name of the position at the velocity encoder, for a drive that has a separate one."""
 
 OF_RATED = 2**50
-"""Offset of the random seed for the noise of the velocity encoder, larger than any seed of a drive."""
+"""Offset from a drive's random seed to the seed for the noise of its velocity encoder. It is larger than any seed."""
 
 
 @dataclass(frozen=True)
 class AsBuilt:
-    """The structure of a stage as built.
+    """Structure of a stage with its real drive.
 
     `delay_samples` is the delay in whole samples, `current_loop` tells whether the current loop lags, and
-    `velocity_samples` is the number of samples over which a drive without a filter takes the velocity.
+    `velocity_samples` is the number of samples over which a drive without a filter differentiates the position.
     """
 
     structure: Structure
@@ -138,7 +139,7 @@ def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
 
 
 def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
-    """Return the controller with everything between the encoders and the motor's force.
+    """Return the controller together with everything between the encoders and the motor's force.
 
     Each loop that is made is added to `loops`.
     """
@@ -168,7 +169,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return the encoder's reading [m], the commanded force [N], and the numbers kept for the next sample."""
+    """Return the encoder's reading [m], the commanded force [N], and the numbers kept until the next sample."""
     from dataclasses import replace
 
     import sympy as sp
@@ -197,5 +198,5 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     measured = replace(loop, error=error, position=reading, rated=rated)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
-    last = Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
+    last = Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may not change
     return reading, command, (*held, Held(before, last, STEADY.error))

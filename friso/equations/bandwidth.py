@@ -1,4 +1,4 @@
-"""Return the bandwidth of a controller, and make it faster or slower as a whole."""
+"""Find the bandwidth of a controller, and make the controller faster or slower as a whole."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def range_example(flat: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class _Numbers:
-    """The keys of a controller as numbers."""
+    """A controller's keys as numbers, for `ControllerSection.stiffness`, which usually gets symbols."""
 
     flat: Mapping[str, Any]
 

@@ -27,9 +27,9 @@ from friso.stage.standstill import FrictionSettings
 class Loop:
     """Inputs of a controller.
 
-    They are the error [m], the position [m] and its rate, and the rate [m/s] and acceleration [m/s^2] of the reference.
-    The direction of the reference is 1 ahead, -1 back, 0 at rest. The position [m] at the encoder of the velocity is
-    separate where that is another encoder. The jerk of the reference is in m/s^3.
+    They are the error [m], the position [m] and its rate, and the rate [m/s], acceleration [m/s^2] and jerk [m/s^3] of
+    the reference. The direction of the reference is 1 ahead, -1 back, 0 at rest. `rated` is the position [m] at the
+    encoder of the velocity, if that is another encoder.
     """
 
     error: sp.Expr
@@ -62,8 +62,8 @@ class Signal:
     """A signal in a controller.
 
     It has its value, the magnitude below which it does not matter, and its value and rate in a steady motion that has
-    lasted (in terms of `STEADY`). Where such expressions exist, it also has its rate in continuous time and its value
-    at the sample before. Signals can be added, and multiplied by gains.
+    lasted (in terms of `STEADY`). It may also have its rate in continuous time, and its value at the sample before.
+    Signals can be added, and multiplied by gains.
     """
 
     value: sp.Expr
@@ -168,7 +168,7 @@ class Blocks(ABC):
         return signal
 
     def key(self, name: str) -> sp.Symbol:
-        """Return the parameter called `name` of the table [controller], in SI units."""
+        """Return the symbol of the key `name` of the table [controller], in SI units."""
         return key(ControllerSection.key(name))
 
     @property
@@ -233,7 +233,10 @@ class Blocks(ABC):
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return a constant force towards the reference, while the reference rests and the error is not small."""
+        """Return a constant force towards the reference.
+
+        It acts while the reference rests and the error is not small.
+        """
 
     @abstractmethod
     def dither(self) -> Signal:
@@ -277,7 +280,7 @@ class Blocks(ABC):
 
 
 class _Row(dict[str, sp.Symbol]):
-    """The keys of one row in an array of tables, as parameters."""
+    """The keys of one row in an array of tables, given as parameters."""
 
     def __init__(self, place: str) -> None:
         super().__init__()

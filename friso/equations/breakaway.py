@@ -23,7 +23,7 @@ Force = Callable[[Mapping[str, Any]], Any]
 def breakaway(flat: Mapping[str, Any]) -> Any:
     """Return the largest friction force at rest [N] of guide and motor together.
 
-    It is a number, or an array if keys are. Laws that declare none count as 0.
+    The result is an array if keys are arrays. A law that declares no such force counts as 0.
     """
     return sum(_breakaway(keys) for keys in _tables(flat))
 
@@ -49,7 +49,7 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the flat keys once as the guide's friction law and once as the motor's sees them."""
+    """Return the flat keys twice: as the guide's friction law sees them, and as the motor's does."""
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]
 

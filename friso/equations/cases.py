@@ -1,8 +1,8 @@
-"""Piecewise expressions that keep their conditions as written.
+"""Define piecewise expressions that keep their conditions as written.
 
 SymPy's own class simplifies conditions in which other piecewise expressions occur, whenever one is made or changed.
-Conditions of a sampled controller with settings against friction depend on each other. For those, SymPy takes minutes
-and finds nothing shorter.
+Conditions of a sampled controller with settings against friction depend on each other. For such conditions SymPy takes
+minutes and finds nothing shorter.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class Piecewise(sp.Piecewise):
     """The first of some expressions whose condition holds.
 
     An example is ``Piecewise((1, x > 0), (-1, x < 0), (0, True))``. Cases whose condition is never true are left out,
-    and so is everything after a condition that is always true. Cases before that one with the same expression, as a
-    derivative may have, are left out too. Raises TypeError where no condition can be true.
+    and so is everything after a condition that is always true. If the cases just before that last one have its
+    expression, as in a derivative, they are left out too. Raises TypeError where no condition can be true.
     """
 
     def __new__(cls, *cases: Any, **options: Any) -> Any:

@@ -1,5 +1,4 @@
-"""Define the building blocks of the model: states, kinks and outputs,
-written in SymPy symbols.
+"""Define the building blocks of the model in SymPy symbols: states, kinks and outputs.
 
 A parameter is a symbol named after its stage-file key. So its value is looked up in the flat stage, and a derivative
 with respect to it is a sensitivity to that key.
@@ -55,8 +54,8 @@ class State:
 class Held:
     """A number that is held between samples.
 
-    It has an expression for its next value, in terms of the values held just before, and its value in a steady motion
-    that has lasted (in terms of `STEADY`). It also has a role.
+    It has an expression for its next value, in terms of the held values just before, a role, and its value in a steady
+    motion that has lasted (in terms of `STEADY`).
     """
 
     symbol: sp.Symbol
@@ -100,7 +99,7 @@ class gaussian(sp.Function):
 
 
 class sine(sp.Function):
-    """sin(2 pi x) of a number of turns x (`friso.engine`)."""
+    """The function sin(2 pi x) of a number of turns x (`friso.engine`)."""
 
     nargs = 1
 
@@ -119,7 +118,7 @@ class clipped(sp.Function):
 
 
 class quantised(sp.Function):
-    """A number rounded to multiples of the second argument; unchanged if that is 0."""
+    """A number rounded to multiples of the second argument; unchanged if that argument is 0."""
 
     nargs = 2
 
@@ -173,7 +172,7 @@ class Kink:
 
 @dataclass(frozen=True)
 class Switch(Kink):
-    """A mode with memory, such as slipping: the history of the motion decides its side.
+    """A mode with memory, such as slipping: the history of the motion decides whether it holds.
 
     The mode is entered where `enter` rises through 0, and left where `leave` does. `beyond` is 1 in the mode. `begins`
     is positive in states where a run begins in the mode, if nothing else decides; it contains no mode. `entered` and

@@ -1,9 +1,9 @@
-"""Operating conditions of a machine, which multiply static and Coulomb friction of its guide for every law.
+"""Apply the operating conditions of a machine to static and Coulomb friction of its guide.
 
-Friction consists of a constant part (seals, preload) and a part that grows with the normal force. It is larger in the
-cold: Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A running machine warms up exponentially in time:
-Simoni, Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. For the variation of friction along a rail, see
-`friso.equations.rail`.
+They multiply both for every friction law. Friction consists of a constant part (seals, preload) and a part that grows
+with the normal force. It is larger in the cold: Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A running
+machine warms up exponentially in time: Simoni, Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. For the
+variation of friction along a rail, see `friso.equations.rail`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ GROWTH = f"{CONDITIONS}.growth"
 """Key of the relative growth of the factors per acceleration of the reference [s^2/m]."""
 
 DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
-"""Numeric keys that decide whether the load follows the acceleration."""
+"""Numeric keys that decide whether friction follows the acceleration of the reference."""
 
 
 def factor_key(level: str) -> str:
@@ -61,7 +61,10 @@ def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
 
 
 def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
-    """Return substitutions from the factors at constant speed to those at an acceleration [m/s^2]."""
+    """Return substitutions that turn the friction factors into those at an acceleration [m/s^2].
+
+    Without them, the factors are those at constant speed.
+    """
     from friso.equations.component import key
 
     factors = [key(factor_key(name)) for name in LEVELS]
@@ -79,7 +82,8 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
     loaded = 1 - own["load_share"] + own["load_share"] * own["load"]
     warm = np.exp(-own["running_time"] / own.get("warm_up_time", np.inf))
     common = loaded * (1 + (own["cold"] - 1) * warm)
-    varies = "rail.seed" in flat and ("rail.correlation_length" in flat or not _deviates(flat))  # else a rule is broken
+    # else the file breaks a rule
+    varies = "rail.seed" in flat and ("rail.correlation_length" in flat or not _deviates(flat))
     place = _at_place(flat, own["place"]) if "place" in own and varies else np.ones(len(LEVELS))
     made = {factor_key(name): common * there for name, there in zip(LEVELS, place, strict=True)}
     made[GROWTH] = own["load_share"] * own["load_per_acceleration"] / loaded
@@ -89,7 +93,7 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the flat keys of a machine that moves along its rail.
 
-    Its friction factors omit those of a single place.
+    Its friction factors leave out the factors of a single place.
     """
     if not has_conditions(flat):
         return dict(flat)

@@ -28,10 +28,9 @@ from friso.stage.filters import FilterRule, Polynomial
 from friso.stage.rig import IntegralRule
 
 UNWINDING_BAND = sp.Rational(1, 1000)
-"""Width of the band over which an integrator stops at the force limit, as a fraction of the limit.
-
-An integrator that stopped abruptly would make the right-hand side jump, and the solution would switch endlessly along
-the limit. Within the band the stop is continuous, and the motion along the limit is ordinary, if stiff."""
+"""Width of the band over which an integrator stops at the force limit, as a fraction of the limit. An abrupt stop would
+make the right-hand side jump, and the solution would switch endlessly along the limit. Within the band the stop is
+continuous, and the motion along the limit is ordinary, if stiff."""
 
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
@@ -57,9 +56,9 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return proportional [N/m] and integral gain [N/(m s)] for slow changes of a large error.
+    """Return the proportional [N/m] and integral gain [N/(m s)] of a controller for slow, large errors.
 
-    The error lies beyond all windows and deadbands, and the reference rests.
+    Such an error lies beyond all windows and deadbands, and the reference rests.
     """
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
@@ -68,7 +67,7 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
     proportional, integral = _per_error(force), sp.S.Zero
     for x, integrand in blocks.integrands.items():
         gain = sp.diff(force, x)
-        proportional -= gain * sp.diff(integrand, STEADY.velocity)  # the integral of a velocity is a displacement
+        proportional -= gain * sp.diff(integrand, STEADY.velocity)  # the integral of a velocity acts as a displacement
         integral += gain * _per_error(integrand)
     values: dict[Any, Any] = {STEADY.error: FAR}
     values |= {
@@ -89,8 +88,7 @@ def _per_error(value: sp.Expr) -> sp.Expr:
 class ForceLimit:
     """The force limit of a controller.
 
-    It has the limited force [N], its kinks, its difference from the demand [N], and the behaviour of integrators at the
-    limit.
+    It has the limited force [N], its kinks, the difference to the demand [N], and what integrators do at the limit.
     """
 
     limit: sp.Expr
@@ -133,7 +131,7 @@ class Continuous(Blocks):
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
         super().__init__(form)
         self.rate = rate
-        self.gains: sp.Expr = sp.S.One  # the factor of standstill
+        self.gains: sp.Expr = sp.S.One  # factor on the gains at standstill
         self.states: list[State] = []
         self.kinks: list[Kink] = []
         self._integrals: list[_Integral] = []
@@ -231,7 +229,7 @@ class Continuous(Blocks):
         return replace(total, value=value, settled=resting, rate=None)
 
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return the pushing force, with a kink at each end of the window."""
+        """Return the force that pushes towards the reference, with a kink at each end of the window."""
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
@@ -255,15 +253,15 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """Return a mode for the sign of the error; integrals restart where the mode changes."""
+        """Return a mode for the sign of the error; integrals restart at 0 where the sign changes."""
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
-        """Return all states and kinks, with the integrators' behaviour at limits.
+        """Return all states and kinks, including what integrators do at limits.
 
-        Integrators follow the anti-windup where the demand exceeds its bound. Integrators stop where their own output
-        reaches a limit.
+        Integrators follow the anti-windup where the demand exceeds its bound, and stop where their own output reaches a
+        limit.
         """
         steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
@@ -322,9 +320,9 @@ def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return how far an integrator is stopped by a limit: 0 runs, 1 is stopped.
+    """Return how far a limit stops an integrator: 0 runs, 1 is stopped.
 
-    It stops where the value is beyond its limit and would be driven further.
+    The limit stops it where the value is beyond the limit and would be driven further.
     """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):

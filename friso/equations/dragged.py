@@ -1,7 +1,7 @@
-"""Equations of a friction law on a body that follows a measured motion, sample by sample.
+"""Declare a friction law on a body that follows a measured motion, sample by sample.
 
-The friction force does not act back on the motion. The impulse of the friction force is integrated as well. Its
-differences give the mean force between samples, for any law.
+The friction force does not act back on the motion. The impulse of the friction force is integrated as well. Differences
+of the impulse give the mean force between samples, for any law.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Equations of a stage that follows a log: reference and external force are given sample by sample."""
+"""Declare a stage that follows a log: reference and external force are given sample by sample."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ HELD_FORCE = "held_force"
 
 @dataclass(frozen=True)
 class Driven:
-    """The structure of a stage that follows a log.
+    """Structure of a stage that follows a log.
 
-    `velocity_samples` is the number of samples over which the drive takes the velocity; 0 means a controller in
-    continuous time.
+    `velocity_samples` is the number of samples over which the drive differentiates the position; 0 means a controller
+    in continuous time.
     """
 
     structure: Structure
@@ -47,7 +47,10 @@ def driven(form: Driven) -> Model:
 
 
 def _sampled(form: Driven) -> Control:
-    """Return the controller as a drive computes it, sampling at the corners of the reference."""
+    """Return the controller as a drive computes it.
+
+    It samples at the corners of the reference.
+    """
     from dataclasses import replace
 
     from friso.equations.blocks import Controller, Loop

@@ -1,4 +1,4 @@
-"""Equations of a friction law under an imposed sinusoidal motion, for its describing function.
+"""Declare a friction law under an imposed sinusoidal motion, for its describing function.
 
 Time counts in periods, so that all runs have equal length. The first harmonic of the friction force is integrated as
 well, to the solver's tolerance, however abruptly the force changes.
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
     from friso.equations.model import Model
 
 FREQUENCY = "imposed.frequency"
-"""Key of the frequency of the motion [Hz].
-
-Its amplitude is the displacement at the start."""
+"""Key of the frequency of the motion [Hz]. The amplitude of the motion is the displacement at the start."""
 
 HARMONIC = ("in_phase", "in_quadrature")
 """States that integrate the real and the imaginary part of the first harmonic of friction [N] over a period.
@@ -56,7 +54,7 @@ def imposed(form: Imposed) -> Model:
     from friso.equations.masses import Body
     from friso.equations.model import MOTION_SIZE, Model, resets
 
-    body, period = Body.named("", sp.oo), 1 / key(FREQUENCY)  # nothing acts back on a motion that is imposed
+    body, period = Body.named("", sp.oo), 1 / key(FREQUENCY)  # no force acts back on the imposed motion
     position, velocity = body.position, body.velocity
     friction: Friction = friction_law(form.friction).declare(velocity, form.friction_variant)
     omega, size = 2 * sp.pi / period, friction.breakaway
@@ -86,7 +84,7 @@ def imposed(form: Imposed) -> Model:
 def _per_period(inner: State, period: sp.Expr) -> State:
     """Return a state of the law with its rate per period.
 
-    States that are lengths are scaled by the motion.
+    States that are lengths get the motion as their scale.
     """
     import sympy as sp
 

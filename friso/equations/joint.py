@@ -1,4 +1,4 @@
-"""The compliant joint between cart and stage, with its stroke limiter in parallel when touched (thesis, Fig. 3).
+"""Declare the compliant joint between cart and stage, with its stroke limiter (thesis, Fig. 3).
 
 Table 1 of the thesis prints a series formula for the touched limiter. A touching limiter acts in parallel with the leaf
 springs, so stiffness and damping are added here.
@@ -16,9 +16,9 @@ from friso.equations.structure import JointForm
 def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pulls: bool) -> tuple[sp.Expr, Component]:
     """Return the force of the joint on the cart [N], and its kinks, for a deflection [m].
 
-    "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter always
-    touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that does not pull lets go
-    where its damping would outweigh its stiffness.
+    "locked": cart and stage are coupled by the limiter alone. "touching": the stroke is zero, so that the limiter
+    always touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that cannot pull
+    lets go where its damping would outweigh its stiffness.
     """
     contact = key("joint.limiter_stiffness") * deflection + key("joint.limiter_damping") * rate
     leaves = key("joint.stiffness") * deflection + key("joint.damping") * rate
@@ -45,5 +45,8 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pul
 
 
 def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:
-    """Return where the limiter of a free joint touches, ahead and behind, for a deflection [m]."""
+    """Return the kinks at which the limiter of a free joint touches, ahead and behind.
+
+    `deflection` [m] is that of the joint.
+    """
     return stops(deflection, key("joint.stroke"), "stroke")

@@ -33,8 +33,8 @@ class Body:
 def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
     """Return the force of the stage on the parasitic mass [N], by a spring and a damper.
 
-    They are those of the first internal mode. `parasitic.frequency` is that of the two halves of the stage against
-    each other (design.md, section 1).
+    The spring and the damper represent the first internal mode. `parasitic.frequency` is the frequency at which the two
+    parts of the stage oscillate against each other (design.md, section 1).
     """
     reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
     omega = 2 * sp.pi * key("parasitic.frequency")

@@ -1,4 +1,4 @@
-"""Provide what other modules need of a stage's motion: pieces of its reference, places of standstill, size, start."""
+"""Describe a stage's motion for other modules: pieces of its reference, standstill, size and start."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
 
 
 def form_of(flat: Mapping[str, Any]) -> ReferenceForm:
-    """Return the form of the reference of a stage's motion."""
+    """Return the form of a stage's reference: degree of its polynomials and number of sinusoids."""
     return motion_of(flat).form(flat)
 
 
@@ -37,7 +37,7 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 
 def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
-    """Return pieces with sinusoids added, and further corners where the reference reverses."""
+    """Return pieces with sinusoids added, cut also where the reference reverses."""
     ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
     for number, tone in enumerate(tones):
         for i, part in enumerate(tone):

@@ -1,4 +1,4 @@
-"""Factors by which the bearing's static and Coulomb friction vary along its rail."""
+"""Compute the factors by which the bearing's static and Coulomb friction vary along its rail."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ PHASES, FIELD = int.from_bytes(b"phases"), int.from_bytes(b"field")
 HARMONICS = ("first", "second", "third")
 
 CELLS, REACH = 2, 5
-"""Cells of white noise per correlation length, and length of the smoothing kernel to each side, in correlation lengths.
-
-The sum over cells then differs from the integral by a fraction 2 exp(-(pi CELLS)^2 / 2) = 5e-9 (Poisson's summation)
-and by exp(-REACH^2)."""
+"""Cells of white noise per correlation length, and length of the smoothing kernel to each side in correlation lengths.
+They make the sum over cells differ from the integral by a fraction 2 exp(-(pi CELLS)^2 / 2) = 5e-9 (Poisson's
+summation) and by exp(-REACH^2)."""
 
 MOST_CELLS = 10**7
 """Largest number of cells of a rail, for which arrays of some 100 MB are needed."""
@@ -52,9 +51,9 @@ def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | No
 def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
     """Return a Gaussian field at places [m], shape (n,), with mean 0 and variance 1.
 
-    Its correlation is exp(-(d / length)^2 / 2): white noise in cells counted from place 0, smoothed by exp(-(d /
-    length)^2). A random Fourier series needs many more terms than the 21 here until it is Gaussian, and its few
-    longest waves repeat along a rail. Raises InputError.
+    Its correlation is exp(-(d / length)^2 / 2). It is white noise in cells counted from place 0, smoothed by exp(-(d /
+    length)^2). A random Fourier series would need many more terms than the 21 cells here until it is Gaussian, and its
+    few longest waves would repeat along a rail. Raises InputError.
     """
     at = places * (CELLS / length)
     cell = np.rint(at)

@@ -1,9 +1,9 @@
-"""The reference within a piece: a polynomial and tones, in symbols for the equations, in numbers for everything else.
+"""Evaluate the reference within a piece: a polynomial and tones.
 
-A row of numbers describes a piece. It holds the start [s] and the derivatives of the polynomial at the start. With
-tones it also holds the direction in which the reference moves (1, -1), and for each tone amplitude [m], phase [turns],
-frequency [Hz] and sweep [Hz/s]. Phases and frequencies of tones are those at the start of the piece, so that they stay
-small.
+They are symbols in the equations, and numbers elsewhere. A row of numbers describes a piece. It holds the start [s] and
+the derivatives of the polynomial at the start. With tones it also holds the direction in which the reference moves (1,
+-1), and for each tone amplitude [m], phase [turns], frequency [Hz] and sweep [Hz/s]. Phases and frequencies of tones
+are given at the start of the piece, so that they stay small.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
 def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
     """Tell which pieces stand still, in the shape of the rows.
 
-    With `derivative` 2, tell which ones have a constant velocity.
+    With `derivative` 2, tell which pieces have a constant velocity.
     """
     rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):

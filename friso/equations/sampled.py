@@ -1,8 +1,9 @@
-"""Controllers as a sampled drive computes them: the force changes at each sample and is held until the next.
+"""Realise controllers as a sampled drive computes them.
 
-Filters and integrals are discretised block by block, by the rules of the drive (Franklin, Powell, Workman 1998, Digital
-Control of Dynamic Systems, chapter 6). Without a filter a derivative is a difference over samples. Bode plots of a
-sampled drive use these equations too (`friso.frequency.rates`).
+The force changes at each sample and is held until the next. Filters and integrals are discretised block by block, by
+the rules of the drive (Franklin, Powell, Workman 1998, Digital Control of Dynamic Systems, chapter 6). Without a filter
+a derivative is a difference over samples. Bode plots of a sampled drive use these equations too
+(`friso.frequency.rates`).
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ def sampled_controller(
     """Return the force [N] that a drive commands at a sample, and what it keeps for the next.
 
     An `extra` force is added before the limit. `loop` holds what is known at the sample. A derivative without a filter
-    is a difference over `velocity_samples`. At the force limit an integrator follows its anti-windup: clamped, it
-    rests for the sample in which it would drive the force further beyond.
+    is a difference over `velocity_samples`. At the force limit an integrator follows its anti-windup; with clamping, it
+    pauses at samples where it would drive the force further beyond the limit.
     """
     blocks = Sampled(velocity_samples, form)
     demand = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks)
@@ -130,9 +131,9 @@ class Sampled(Blocks):
         super().__init__(form)
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
-        self.gains: Any = sp.S.One  # the factor of standstill
+        self.gains: Any = sp.S.One  # factor on the gains at standstill
         self.period: sp.Expr = SAMPLE_TIME
-        self.due: Any = None  # at which samples the present loop is carried out; None: at all
+        self.due: Any = None  # condition under which the present loop runs at a sample; None: always
         self._integrals: list[_Integral] = []
 
     @contextmanager
@@ -305,7 +306,7 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before its limit, and all held numbers, with the integrators' behaviour at limits.
+        """Return the force before its limit, and all held numbers, with what integrators do at limits.
 
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.
@@ -337,7 +338,7 @@ class Sampled(Blocks):
                 following += integral.when_due(integral.period * cut / (gain * unwinding_time()))
             kept = Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
             leak = (2 * sp.pi * self.key("integral_leak") if self.settings.leak else 0) + (integral.leak or 0)
-            left = 1 + integral.when_due(leak * integral.period) if leak else 1  # backward Euler
+            left = 1 + integral.when_due(leak * integral.period) if leak else 1  # leak by backward Euler
             updates[integral.next] = kept / left
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}
         updated: list[tuple[Any, Any]] = [(held.update, held.settled) for held in self.held]

@@ -17,7 +17,7 @@ TABLES = ("friction", MOTOR_FRICTION)
 def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of static friction, each with its key of Coulomb friction.
 
-    Empty for laws that do not have both.
+    The result is empty for a law that does not have both.
     """
     pairs = {f"{table}.static": f"{table}.coulomb" for table in TABLES}
     return {static: coulomb for static, coulomb in pairs.items() if static in flat and coulomb in flat}

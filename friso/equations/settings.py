@@ -1,7 +1,8 @@
-"""Catalogue of a drive's settings against friction: the effect of each, its values for a machine, and its ranges.
+"""Catalogue of a drive's settings against friction.
 
-Their keys are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
---also` tries one value of each setting; `friso tune` searches their ranges.
+It lists the effect of each, its values for a machine, and its ranges. Their keys are declared in
+`friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare --also` tries one value of each
+setting; `friso tune` searches their ranges.
 """
 
 from __future__ import annotations
@@ -37,9 +38,8 @@ WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
 """Ranges of the standstill window, relative to the tolerance, and of the factor on the gains within it."""
 
 AMPLITUDES, FREQUENCIES = (0.1, 1.5), (3.0, 30.0)
-"""Ranges of a dither's amplitude, relative to sliding friction, and of its frequency.
-
-The frequency is relative to the natural frequency of the mass on the loop's stiffness."""
+"""Ranges of a dither's amplitude, relative to sliding friction, and of its frequency, relative to the natural frequency
+of the mass on the loop's stiffness."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Setting:
     def ranges(self, flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
         """Return the setting's keys, and the ranges [SI] in which they are tuned.
 
-        Empty if it is not tuned.
+        The result is empty if the setting is not tuned.
         """
         if self.tuned_in is None:
             return {}
@@ -72,7 +72,7 @@ class Setting:
 
 
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
-    """Return the stage's flat keys for each set of gains that its loop may have.
+    """Return the stage's flat keys once for each set of gains that its loop may have.
 
     There is one set outside the standstill window, and one within it.
     """
@@ -167,10 +167,10 @@ SETTINGS: Mapping[str, Setting] = {
         "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither, _dithers
     ),
 }
-"""Sizes are our choice: an integral that can just break the machine loose; a leak at a tenth of the integral's corner;
-integrals that pause within half the tolerance until twice the tolerance is exceeded; half the gains within five
-tolerances; a push of four fifths of Coulomb friction outside the tolerance; a dither of half of it at ten times the
-bandwidth, or with twenty samples a period."""
+"""All settings against friction, by name. Sizes are our choice: an integral that can just break the machine loose; a
+leak at a tenth of the integral's corner; integrals that pause within half the tolerance until the error exceeds twice
+the tolerance; half the gains within five tolerances; a push of four fifths of Coulomb friction outside the tolerance;
+and a dither of half of Coulomb friction at ten times the bandwidth, or with twenty samples a period."""
 
 
 def settings_named(names: tuple[str, ...], others: tuple[str, ...] = ()) -> tuple[Setting, ...]:

@@ -53,7 +53,7 @@ class ControllerForm:
 
     @property
     def section(self) -> type[ControllerSection]:
-        """Return the class that declares its blocks."""
+        """Return the class that declares the blocks of the controller."""
         return CONTROLLERS.form(self.kind, self.form)
 
     @property

@@ -56,7 +56,7 @@ Small = Mapping[sp.Symbol, sp.Symbol]
 
 
 def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
-    """Return the derivative of an expression along the deviation."""
+    """Return the directional derivative of an expression along the deviation."""
     terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
     return sum(terms, start=sp.S.Zero)
 
@@ -99,9 +99,10 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Tell whether a difference is zero everywhere on the surface of a kink, tested at some points of it.
+    """Tell whether a difference is zero everywhere on the surface of a kink.
 
-    It counts as not zero if the surface is linear in no symbol; such a surface bounds a window.
+    It is tested at some points. It counts as not zero if the surface is linear in no symbol; such a surface bounds a
+    window.
     """
     if gap == 0:
         return True

@@ -1,4 +1,4 @@
-"""Compute the bandwidth of a loop: the highest frequency at which its gain is 1, for any controller."""
+"""Compute the bandwidth of a loop, for any controller: the highest frequency at which its gain is 1."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from friso.frequency.members import Members, limit_cases
 from friso.stage import Stage
 
 GRID = np.geomspace(0.01, 1e4, 800)
-"""Frequencies [Hz] at which loops are evaluated for their bandwidth, beside those near resonances of the stage."""
+"""Frequencies [Hz] at which loops are evaluated for their bandwidth; more lie near resonances of the stage."""
 
 
 def loop_bandwidth(stage: Stage) -> float:
     """Return the bandwidth [Hz] of a stage: the last frequency at which its loop has gain 1.
 
-    The stage slides; while it is stuck its bearing holds it, and the loop hardly moves it. NaN if the gain never
-    reaches 1. With other gains at standstill the larger bandwidth counts.
+    The stage slides; while it is stuck, the bearing holds it and the loop hardly moves it. The result is NaN if the
+    gain never reaches 1. With other gains at standstill the larger bandwidth counts.
     """
     return float(np.fmax.reduce([_last_crossing(flat) for flat in gain_states(stage.flat())]))
 
@@ -61,9 +61,9 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
-    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,); NaN without any.
+    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,).
 
-    They are searched on a grid of angular frequencies [rad/s].
+    They are searched on a grid of angular frequencies [rad/s]. NaN marks a loop that never does.
     """
     loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))

@@ -1,4 +1,4 @@
-"""Analyse a stage linearly: limit cases, the family behind them, and the highest bandwidth of its controller."""
+"""Analyse a stage linearly: limit cases, states between them, and the controller's highest bandwidth."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class BodeCase:
 
 @dataclass(frozen=True)
 class Unstable:
-    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable.
+    """Range of speeds [m/s], from `low` to `high`, at which a sliding stage is not stable.
 
     `falling` tells whether its friction is smaller at the upper end.
     """
@@ -71,11 +71,11 @@ class Prescribed:
 
 @dataclass(frozen=True)
 class Bode:
-    """The linear analysis of a stage.
+    """Linear analysis of a stage.
 
     `omega` (k,) [rad/s] are the frequencies of all curves; `cases` are the limit cases by name, optionally with the
-    thesis's formula for a touched limiter ("-series"); `cascades` are the loops of a cascade by limit case. All else is
-    computed on demand.
+    thesis's formula for a touched limiter ("-series"); `cascades` are the loops of a cascade by limit case. All other
+    results are computed on demand.
     """
 
     stage: Stage
@@ -85,7 +85,7 @@ class Bode:
 
     @cached_property
     def scan(self) -> Scan:
-        """Return the stability of the family."""
+        """Return the stability of all states of the family."""
         flat = self.stage.flat()
         return scan_stability(flat, family(flat))
 
@@ -101,12 +101,12 @@ class Bode:
 
     @cached_property
     def loops(self) -> np.ndarray:
-        """Return the loops L of the family over `omega`, complex, shape (members, k)."""
+        """Return the loops L in all states of the family over `omega`, complex, shape (members, k)."""
         return loops(self.scan.flat, self.scan.members, self.omega)
 
     @cached_property
     def worst(self) -> tuple[Members, Margins]:
-        """Return the worst member of the family, with its margins."""
+        """Return the worst state of the family, with its margins."""
         return self._with_margins(self.scan.worst())
 
     @cached_property
@@ -147,7 +147,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     margins_of = {name: margins(*state) for name, state in states.items()}
     low, high = band or _mattering(flat, margins_of.values())
-    for keys in _by_joint(stage).values():  # a delay that is too long is refused now, not once the limits are asked for
+    for keys in _by_joint(stage).values():  # refuse a delay that is too long now, before the limits are requested
         closed_loop_poles(keys, concatenate_families([*limit_cases(keys).values()]))
     together = concatenate_families([*limit_cases(flat).values()])
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
@@ -180,16 +180,16 @@ def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Compl
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """Return the cases with a touched limiter modelled as in Table 1 of the thesis.
+    """Return the cases with a touched limiter, modelled as in Table 1 of the thesis.
 
-    The limiter is in series with the joint there, so the stage has another joint and no touched limiter.
+    There the limiter is in series with the joint, so the stage has another joint and no limiter.
     """
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
-    """Return a range of frequencies [Hz] that shows all crossovers and resonances."""
+    """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage."""
     settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)

@@ -1,8 +1,8 @@
 """Compute the loops of a cascade separately, each opened where a drive's Bode plot opens it.
 
 The plant leads from the commanded force to the velocity at the encoder. The velocity loop is cut where the velocity is
-fed back, with the position loop open; the position loop where the position is fed back, with the velocity loop closed
-(Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are
+fed back, with the position loop open. The position loop is cut where the position is fed back, with the velocity loop
+closed (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at several rates both are
 characteristic loci (`friso.frequency.rates`), which do not depend on the place of the cut.
 """
 
@@ -31,10 +31,10 @@ CascadeLoop = Literal["velocity", "position"]
 
 @dataclass(frozen=True)
 class CascadeLoops:
-    """The loops of a cascade in one state, complex, over `Bode.omega`.
+    """Loops of a cascade in one state, complex, over `Bode.omega`.
 
-    `plant` leads from the commanded force to the velocity [m/(N s)], with hold, delay and current loop. Loops stand by
-    name, each with its margins.
+    `plant` leads from the commanded force to the velocity [m/(N s)], with hold, delay and current loop. `loops` are the
+    loops by name, each with its margins.
     """
 
     plant: np.ndarray
@@ -51,7 +51,7 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
     """Return the loops of a cascade in one state at angular frequencies [rad/s]."""
     drive = DriveTiming.of(flat)
     moved = plant(flat, member).take((FORCE,), (VELOCITY,)).at(1j * omega)[0, :, 0, 0]
-    alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # the position loop is open
+    alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # open the position loop
     timing = DriveTiming.of(alone)
     inner, outer = response(alone, member, timing, cut=STAGE), _position_loop(flat, member, drive)
     of_inner = poles(alone, member, timing, cut=STAGE)
@@ -68,7 +68,7 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
 
 
 def _seen(rates: Complex) -> np.ndarray:
-    """Return which poles [rad/s] of a velocity loop (1, n) the loop can affect, shape (n,)."""
+    """Return which poles [rad/s] of a velocity loop (1, n) the feedback can move, shape (n,)."""
     settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
     return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)

@@ -30,16 +30,16 @@ WANTED = 0.5
 
 @dataclass(frozen=True)
 class Limits:
-    """The crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
+    """Crossovers [Hz] at which a stage is stable, and those with a `comfortable` margin.
 
     They are ranges within `searched_crossovers`, valid in all limit cases: stuck under any bias force or sliding fast,
     limiter free or touched.
 
     For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
     `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
-    the state that becomes unstable just above the first, `closest` the state that comes closest to -1 just above the
-    second (None at the end of the search); without a range, they are those at the stage's own crossover. For a
-    controller given by gains all values are factors of its bandwidth.
+    the state that becomes unstable just above `highest_stable`, and `closest` the state that comes closest to -1 just
+    above `highest_comfortable` (None at the end of the search). Without a range, both states are given at the stage's
+    own crossover. For a controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -92,7 +92,10 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """Return the range of crossovers that is searched, which ends below half the sampling frequency of a drive."""
+    """Return the range of crossovers that is searched.
+
+    It ends below half the sampling frequency of a drive.
+    """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
@@ -117,7 +120,10 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 
 def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Tell whether only samples and delays of a drive make the loop unstable, for a sticking and a sliding stage."""
+    """Tell whether only sampling and delay of a drive make the loop unstable.
+
+    The first result is for a sticking stage, the second for a sliding one.
+    """
     members = settled_members(flat)
     smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
     if len(smooth) == len(flat):
@@ -175,7 +181,8 @@ class _Search:
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
         """Return frequencies [rad/s] that resolve the loop at all crossovers, and a function for loops there.
 
-        Frequencies are fixed, so that the distance is a smooth function. The function takes the keys of any controller.
+        The frequencies do not depend on the crossover, so that the distance is a smooth function. The function takes
+        the keys of any controller.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
@@ -190,6 +197,6 @@ class _Search:
         return self._looked_at(self.at)
 
     def _looked_at(self, crossover: np.ndarray) -> PoleStability:
-        """Return the stability of all members at the first crossover, then at the second, and so on."""
+        """Return the stability of all members at each crossover, one crossover after the other."""
         keys = _at(self.flat, np.repeat(crossover, len(self.members)))
         return stability_by_poles(keys, self.members.repeated(len(crossover)))

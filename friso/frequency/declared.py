@@ -15,7 +15,7 @@ from friso.frequency.system import System
 
 @dataclass(frozen=True)
 class Declared:
-    """Equations to be linearised, by symbols.
+    """Equations to be linearised, in symbols.
 
     They have states with their rates, inputs, and outputs with their expressions, by name.
     """
@@ -27,7 +27,7 @@ class Declared:
 
     @cached_property
     def _entries(self) -> tuple[list[tuple[int, int]], Any, list[str]]:
-        """Return the places of the non-zero entries of [[a, b], [c, d]], and a function for them.
+        """Return the places of the non-zero entries of [[a, b], [c, d]], and a function for their values.
 
         Also returns the names of the function's arguments.
         """

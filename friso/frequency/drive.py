@@ -63,7 +63,7 @@ class DriveTiming:
 
     @property
     def highest(self) -> float:
-        """Return half the sampling frequency [rad/s], the highest that the drive can represent."""
+        """Return half the sampling frequency [rad/s], the highest frequency that the drive can represent."""
         return np.pi / self.sample_time if self.sample_time else np.inf
 
     @property
@@ -73,15 +73,15 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return the transfer of hold, delay and current loop at [rad/s], without aliases."""
+        """Return the response of hold, delay and current loop at frequencies [rad/s], without aliases."""
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 
     def to_s(self, poles: Complex) -> Complex:
         """Return the poles of the loop as s [rad/s].
 
-        For a sampled loop they are the slowest s whose exponential over the period is the pole; 0 becomes minus
-        infinity.
+        For a sampled loop each is the slowest s whose exponential over the period is the pole; a pole at 0 becomes
+        minus infinity.
         """
         if not self.sample_time:
             return poles
@@ -107,12 +107,13 @@ def behind_current_loop(machine: System, lag: float) -> System:
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
     """Return a plant with one input in discrete time, behind a hold and a delay.
 
-    The delay `late` [s] is less than a sample. The result is exact; the force that still acts is a further state.
+    The delay `late` [s] is less than a sample. The result is exact; the force that is still acting becomes a further
+    state.
     """
     members, n, waiting = len(machine.a), len(machine.states), int(late > 0)
     rest, before = _transition(machine, late)
     ahead, after = _transition(machine, sample_time - late)
-    following = np.zeros((members, n + waiting, n + 1 + waiting))  # from states, the new force, and the one before it
+    following = np.zeros((members, n + waiting, n + 1 + waiting))  # from states, the new force, and the previous one
     following[:, :n, :n], following[:, :n, [n]] = ahead @ rest, after
     if waiting:
         following[:, :n, [n + 1]], following[:, n, n] = ahead @ before, 1.0
@@ -134,8 +135,8 @@ def waited(machine: System, samples: int) -> System:
 def delayed(machine: System, delay: float, loop: float) -> System:
     """Return a plant with one input behind a delay [s], as a row of rational functions (Pade).
 
-    The closed loop without delay has resonances of up to `loop` [rad/s]. Raises InputError if the plant's own
-    resonances turn too far within the delay.
+    `loop` [rad/s] is the fastest resonance of the closed loop without delay. Raises InputError if the phase of the
+    plant's own resonances turns too far within the delay.
     """
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
@@ -158,7 +159,7 @@ def delayed(machine: System, delay: float, loop: float) -> System:
 
 
 def fastest(poles: Complex) -> float:
-    """Largest magnitude [rad/s] of the resonances among poles; 0 if there are none."""
+    """Return the largest magnitude [rad/s] of the resonances among poles; 0 if there are none."""
     return float(np.abs(resonances(poles.ravel())).max(initial=0.0))
 
 

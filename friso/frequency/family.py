@@ -1,8 +1,9 @@
-"""Analyse a family of states at once: friction is an impedance between cart and ground, the masses are computed once.
+"""Analyse a family of states of a stage at once.
 
-The masses without friction respond to forces on stage and cart by g (2 x 2), and by h with the cart held. With the
-dynamic stiffness k = s Z of friction on the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large
-numbers are subtracted, and each member and frequency takes a few operations.
+Friction is an impedance between cart and ground, and the masses are computed once. The masses without friction respond
+to forces on stage and cart by g (2 x 2), and by h with the cart held. With the dynamic stiffness k = s Z of friction on
+the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large numbers are subtracted, and each member and
+frequency takes a few operations.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ _T = TypeVar("_T")
 
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Frequencies about a member's closed-loop resonances at which it is evaluated, in half widths."""
+"""Frequencies around a member's closed-loop resonances at which it is evaluated, in half widths."""
 
 
 @dataclass(frozen=True)
 class Scan:
-    """The stability of the `members` of a stage with keys `flat`, arrays of shape (members,).
+    """Stability of the `members` of a stage with keys `flat`, arrays of shape (members,).
 
-    Modulus margins are computed when they are first asked for.
+    Modulus margins are computed on first use.
     """
 
     flat: Mapping[str, Any]
@@ -59,8 +60,8 @@ class Scan:
     def distance(self) -> np.ndarray:
         """Return the least distance of each member's loop from -1.
 
-        It is computed on common frequencies and near each member's closed-loop resonances, and exactly for the members
-        that come closest to -1.
+        It is computed at common frequencies and near each member's closed-loop resonances. For the members that come
+        closest to -1 it is exact.
         """
         settings = FrequencySettings.current()
         omega = frequency_grid(self.flat, settings.family_density)
@@ -124,7 +125,8 @@ def for_poles(
 ) -> list[tuple[np.ndarray, _T]]:
     """Apply a function to the poles of all members, a few at a time, side by side.
 
-    Yields their numbers and the results. `flat` may hold arrays of shape (members,), except in the drive's keys.
+    Yields the numbers of the members and the results. `flat` may hold arrays of shape (members,), except in the drive's
+    keys.
     """
     drive = DriveTiming.of(flat)
 
@@ -147,10 +149,10 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 def about_resonances(system: Poles) -> np.ndarray:
     """Return angular frequencies [rad/s] about each member's lightly damped closed-loop poles.
 
-    Shape (members, k), NaN where there are fewer.
+    The shape is (members, k), with NaN for members that have fewer.
     """
     settings = FrequencySettings.current()
-    if system.drive.period > 1:  # its poles do not tell which alias resonates
+    if system.drive.period > 1:  # its poles do not show which alias resonates
         return np.full((len(system.closed), 1), np.nan)
     closed = system.in_s
     light = (closed.imag > 0) & (np.abs(closed.real) < settings.light_damping * closed.imag)
@@ -188,14 +190,14 @@ def closed_loop_poles(flat: Mapping[str, Any], members: Members) -> Complex:
 
 
 def plant_poles(flat: Mapping[str, Any], members: Members) -> Complex:
-    """Return the poles [rad/s] of the plant in all these states."""
+    """Return the poles [rad/s] of the plant in all states of `members`."""
     return np.concatenate([np.linalg.eigvals(plant(flat, kind).a).ravel() for kind in members.kinds]).astype(complex)
 
 
 def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Return stage position over actuator force [m/N], complex, shape (members, k).
 
-    The angular frequencies (k,) are in [rad/s].
+    `omega` (k,) are angular frequencies [rad/s].
     """
     s = 1j * omega
     sides = np.unique(members.touched)
@@ -244,8 +246,8 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Return the measured signals over the force, shape (members, k, 2), from the whole plant.
 
-    They are position [m/N] and velocity [m/(N s)] or, sampled, the position that is differentiated. Encoders may be on
-    different sides of a transmission.
+    They are position [m/N] and velocity [m/(N s)]; for a sampled drive, the second is the position that it
+    differentiates [m/N]. Encoders may be on different sides of a transmission.
     """
     settings = FrequencySettings.current()
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
@@ -267,8 +269,8 @@ def controller_response(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
 def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
     """Return the controller's force over each measured channel, sign reversed, shape (k, 2).
 
-    Channels are position [N/m] and velocity [N s/m] or, sampled, two positions. With loops at several rates, the part
-    at the frequency of the input counts.
+    Channels are position [N/m] and velocity [N s/m], or two positions for a sampled drive. With loops at several rates,
+    the part at the frequency of the input counts.
     """
     drive = DriveTiming.of(flat)
     if drive.sample_time:

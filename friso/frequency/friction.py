@@ -32,7 +32,7 @@ class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force.
 
     It also has the law's steady states, sliding at a velocity and bearing a bias force at rest: internal states, then
-    modes that remember and the sides of kinks. The lengths [m] among the scales of its states belong to it.
+    modes that remember and sides of kinks. `lengths` [m] are among the scales of its states.
     """
 
     declared: Declared
@@ -55,7 +55,7 @@ def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of the motor's friction, with its states named as at the motor; None without friction."""
+    """Return the law of the motor's friction, with the names of the motor's states; None without friction."""
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
     if law is None:
@@ -89,9 +89,9 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 
 
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the internal states of the friction law that bear the bias at rest.
+    """Return the internal states of the friction law that bear the bias force at rest.
 
-    All are deflected equally from their unloaded state.
+    All states are deflected equally from their unloaded value.
     """
     pulled = sp.Symbol("pulled", real=True)
     relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}

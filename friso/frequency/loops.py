@@ -33,8 +33,8 @@ ROUNDING = 50 * float(np.finfo(float).eps)
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
     """Return the loop cut at the actuator force, in continuous time.
 
-    It runs from the force on the stage to the force of the controller, with reversed sign, so that 1 + L = 0 at the
-    poles of the closed loop.
+    It leads from the force on the stage to the controller's force with reversed sign, so that 1 + L = 0 at the poles of
+    the closed loop.
     """
     return _cut(plant(flat, members), compensator(flat, len(members)))
 
@@ -76,10 +76,10 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
 
 @dataclass(frozen=True)
 class Poles:
-    """Poles of the `closed` and of the `cut` loop with its drive, both of shape (members, n).
+    """Poles of the `closed` loop, and of the loop `cut` open, both of shape (members, n).
 
-    They are in the plane of s [rad/s], or of z for a sampled drive. `continuous` are the poles of the closed loop in
-    continuous time without delay.
+    They include the drive, and are in the plane of s [rad/s], or of z for a sampled drive. `continuous` are the poles
+    of the closed loop in continuous time without delay.
     """
 
     closed: Complex
@@ -89,7 +89,7 @@ class Poles:
 
     @property
     def in_s(self) -> Complex:
-        """Closed-loop poles as s [rad/s] (see `DriveTiming.to_s`)."""
+        """Return the closed-loop poles as s [rad/s] (see `DriveTiming.to_s`)."""
         return self.drive.to_s(self.closed)
 
     @property
@@ -111,7 +111,7 @@ class Poles:
     def distance(self, omega: np.ndarray) -> np.ndarray:
         """Return abs(1 + L) at angular frequencies [rad/s], shape (members, k).
 
-        It is the product of distances from all closed-loop poles over that from all poles of the cut loop.
+        It is the product of the distances to all closed-loop poles, over that to all poles of the cut loop.
         """
         at = self._at(omega)
         squared = np.ones(omega.shape)
@@ -131,7 +131,7 @@ class Poles:
         return ratio - 1
 
     def _at(self, omega: np.ndarray) -> Complex:
-        """Angular frequencies [rad/s] in the plane of the poles."""
+        """Return angular frequencies [rad/s] as points in the plane of the poles."""
         time = self.drive.sample_time * self.drive.period
         return np.asarray(np.exp(1j * omega * time) if time else 1j * omega)
 
@@ -179,32 +179,32 @@ def lifted_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming, cu
 
 
 def _driven(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> System:
-    """From the force that is commanded to all that is measured."""
+    """Return the plant with its drive, from the commanded force to all that is measured."""
     machine = plant(flat, members).take((FORCE,), (STAGE, VELOCITY, RATED))
     return behind_current_loop(machine, drive.lag)
 
 
 def _held(machine: System, drive: DriveTiming) -> System:
-    """From the force at a sample to the positions at the next, behind hold and delay."""
+    """Return the plant behind hold and delay, from the force at a sample to the positions at the next."""
     samples, late = drive.samples_late
     return waited(zero_order_hold(machine, drive.sample_time, late), samples).take((FORCE,), (STAGE, RATED))
 
 
 def _continuous(flat: Mapping[str, Any], members: int, cut: str) -> System:
-    """Return the controller in continuous time, a channel cut."""
+    """Return the controller in continuous time with one channel cut."""
     control = compensator(flat, members)
     return unseen(control, cut) if cut else control
 
 
 def _controls(flat: Mapping[str, Any], members: int, drive: DriveTiming, cut: str) -> tuple[System, ...]:
-    """Return the controller at the samples of a period, a channel cut."""
+    """Return the controller at each sample of a period, with one channel cut."""
     controls = samples_controller({**flat, "drive.sample_time": drive.sample_time}, members, drive.period)
     sampled = {VELOCITY: RATED}.get(cut, cut)
     return tuple(unseen(control, sampled) for control in controls) if cut else controls
 
 
 def _cut(machine: System, control: System) -> System:
-    """Plant and controller in a row, from force to minus the answering force."""
+    """Return plant and controller in series, from the force to minus the controller's force."""
     machine, control = machine.take((FORCE,), (STAGE, VELOCITY)), control.take((STAGE, VELOCITY), (FORCE,))
     n, k = len(machine.states), len(control.states)
     a = np.zeros((len(machine.a), n + k, n + k))
@@ -220,7 +220,7 @@ def _squared(at: Complex, pole: Complex) -> np.ndarray:
 
 
 def _shut(loop: System) -> Complex:
-    """Poles of the closed loop of one that is cut, whose force does not act at once: d is 0."""
+    """Return the poles of the closed loop of a cut loop whose force does not act at once (d is 0)."""
     return np.linalg.eigvals(loop.a - loop.b @ loop.c).astype(complex)
 
 

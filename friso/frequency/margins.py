@@ -1,4 +1,4 @@
-"""Margins of one loop, by their definitions: how much gain, phase or delay it takes to the edge of stability.
+"""Compute margins of one loop: how much gain, phase or delay takes it to the edge of stability.
 
 Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins).
 """
@@ -27,14 +27,17 @@ LoopResponse = Callable[[np.ndarray], Complex]
 
 @dataclass(frozen=True)
 class Margins:
-    """Stability of a loop L cut at the actuator, and how far it is from its edge.
+    """Stability of a loop L cut at the actuator, and how far it is from the edge of stability.
 
-    `poles` [rad/s] of the closed loop (k,), complex; the `abscissa` [1/s], the real part of the rightmost, 0 on the
-    edge of stability as far as rounding can tell; `crossovers` [Hz], all frequencies where abs(L) = 1; the least
-    `phase_margin` [deg], lag or lead, that takes the loop to the edge; `gain_margin`, the factor above 1, and
-    `gain_reduction`, that below 1, by which the gain may change; `delay_margin` [s]; `modulus_margin`, the least
-    distance of L from -1, reached at `closest` [Hz]. Infinite (the reduction 0) where nothing takes it there; NaN for
-    a loop that is not stable.
+    - `poles` [rad/s] of the closed loop (k,), complex; `abscissa` [1/s]: real part of the rightmost one, 0 on the edge
+      of stability within rounding.
+    - `crossovers` [Hz]: all frequencies where abs(L) = 1.
+    - `phase_margin` [deg]: least lag or lead that takes the loop to the edge.
+    - `gain_margin`, above 1, and `gain_reduction`, below 1: factors on the gain that take it there.
+    - `delay_margin` [s]: delay that takes it there.
+    - `modulus_margin`: least distance of L from -1, reached at `closest` [Hz].
+
+    Margins are infinite (the reduction 0) if nothing takes the loop to the edge, and NaN for a loop that is not stable.
     """
 
     poles: Complex
@@ -54,12 +57,12 @@ class Margins:
 
     @property
     def on_the_edge(self) -> bool:
-        """Tell whether a deviation neither dies out nor grows, as an undamped swing."""
+        """Tell whether a deviation neither dies out nor grows, like an undamped oscillation."""
         return self.abscissa == 0
 
     @property
     def peak_sensitivity(self) -> float:
-        """Largest absolute value of 1/(1 + L)."""
+        """Return the peak sensitivity, the largest absolute value of 1/(1 + L)."""
         return 1 / self.modulus_margin if self.modulus_margin else np.inf
 
 
@@ -91,7 +94,7 @@ def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_
 def frequencies(
     flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
-    """Return angular frequencies [rad/s] that resolve the loops of all these states.
+    """Return angular frequencies [rad/s] that resolve the loops of all members.
 
     There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
     the poles `resonant`.
@@ -111,7 +114,7 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
 
 
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
-    """Return the loop at rest, if it is finite there: real, and the same on the way there."""
+    """Return the loop at frequency 0, if it is finite there: real, and constant towards 0."""
     settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
     flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
@@ -123,8 +126,8 @@ def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
 def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
     """Return the margins of a loop from its response.
 
-    `poles` are those of the closed loop, `abscissa` the real part of the rightmost one, and `omega` frequencies
-    [rad/s] that resolve the loop. `ends` are its values where it is real at any gain: at rest, and at half the
+    `poles` belong to the closed loop, `abscissa` is the real part of the rightmost one, and `omega` are frequencies
+    [rad/s] that resolve the loop. `ends` are values of the loop where it is real at any gain: at rest, and at half the
     sampling frequency.
     """
     seen = response(omega)
@@ -152,14 +155,14 @@ def _hertz(omega: np.ndarray) -> tuple[float, ...]:
 
 
 def _decades(loop: Complex) -> np.ndarray:
-    """Logarithm of the magnitude, of a loop that may be 0."""
+    """Return the logarithm of the magnitude of a loop, which may be 0."""
     return np.log(np.maximum(np.abs(loop), np.finfo(float).tiny))
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return where a function of frequency, known at some frequencies, passes zero.
+    """Return where a function of frequency, given at some frequencies, passes zero.
 
-    Jumps, as where a locus goes over to an alias, do not count.
+    Jumps, such as those of a locus that changes to an alias, do not count.
     """
     settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):
@@ -173,9 +176,10 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
-    """Factors by which the gain takes the loop through -1: where L is real and negative."""
+    """Return the factors on the gain that take the loop through -1: where L is real and negative."""
     settings = FrequencySettings.current()
-    clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)  # not rounding
+    # leave out rounding
+    clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
     return -1 / at.real[at.real < -settings.vanishing_loop]

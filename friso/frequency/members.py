@@ -1,4 +1,4 @@
-"""The states a stage can be in: the limit cases of the thesis (Table 1), and the family behind them."""
+"""Define the states that a stage can be in: the thesis's limit cases (Table 1) and states between them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.stage.arguments import check_arguments
 from friso.stage.transmission import leading_friction
 
 BIASES, SPEEDS = 65, 257
-"""Bias forces and speeds of the family, of each state of the limiter."""
+"""Bias forces and speeds in a family, for each state of the limiter."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class Members:
         return len(self.speed)
 
     def __getitem__(self, which: Any) -> Members:
-        """Select the members at these numbers, or in a boolean array."""
+        """Select members by numbers or by a boolean array."""
         return Members(*(np.atleast_1d(getattr(self, field.name)[which]) for field in fields(self)))
 
     @property
     def kinds(self) -> list[Members]:
-        """Return the stuck members and the others, since they have different states.
+        """Return the stuck members and the others as two groups, because they have different states.
 
         Empty groups are left out.
         """
@@ -61,7 +61,7 @@ class Members:
 
     @property
     def settled(self) -> np.ndarray:
-        """Return which of a family are stuck, or slide the fastest."""
+        """Return which members of a family are stuck, or slide the fastest."""
         return self.stuck | (self.speed == self.speed.max())
 
     def with_limiter(self, touched: bool) -> Members:
@@ -69,7 +69,7 @@ class Members:
         return replace(self, touched=np.full(len(self), touched))
 
     def repeated(self, times: int) -> Members:
-        """Return all of them, so many times one after the other."""
+        """Return all members, repeated `times` times one after the other."""
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
@@ -134,7 +134,7 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
                 -settings.greatest_bias_share * level(flat, not forward),
                 settings.greatest_bias_share * level(flat, forward),
             )
-            bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears none
+            bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears no bias
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
             bias = np.concatenate([bias, np.zeros(speeds_)])
             parts.append(Members(speed, bias, np.full(len(speed), touched), np.full(len(speed), forward)))

@@ -1,4 +1,4 @@
-"""The steady state of the friction law in states of a stage: stuck under a bias force, or sliding at a speed."""
+"""Find the steady state of the friction law: stuck under a bias force, or sliding at a speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plant and controller of a stage as linear systems, for many members at once."""
+"""Represent plant and controller of a stage as linear systems, for many members at once."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "referenc
 FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
 RATED = "velocity's encoder"
-"""The position of which the velocity is the rate."""
+"""Name of the position from which the velocity is taken."""
 
 _REFERENCE, _POSITION, _VELOCITY, *_DERIVATIVES = (
     sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend", "r_jerk")
@@ -56,7 +56,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
     values |= {**_limiter(members.touched), **_on_flank()}
-    values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # a reference that neither moves nor accelerates
+    values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # the reference rests
     bodies = {form.cart: law_of(flat)}
     if form.motor:
         bodies[form.motor] = motor_law_of(flat)
@@ -84,13 +84,13 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 
 
 def _limiter(touched: np.ndarray) -> dict[str, Any]:
-    """Return the modes of the limiter by name: free, or touched ahead."""
+    """Return the limiter's modes by name: free, or touched ahead."""
     ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
     return {ahead: touched.astype(float), behind: 0.0}
 
 
 def _on_flank() -> dict[str, Any]:
-    """Return the modes of a backlash by name: the transmission pulls."""
+    """Return the backlash's modes by name: on the flank that pulls."""
     ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
     return {ahead: 1.0, behind: 0.0}
 
@@ -137,7 +137,7 @@ def _plant(form: Structure) -> _Plant:
         seen.append(loop)
         return Controller(push, Component())
 
-    at_rest = replace(form, controller=None, biased=("cart",), limiter_pulls=True)  # what is touched stays so
+    at_rest = replace(form, controller=None, biased=("cart",), limiter_pulls=True)  # a touched limiter stays touched
     model = assemble(at_rest, control=control)
     (loop,) = seen
     expressions = {name: output.expression for name, output in model.outputs.items()}
@@ -163,7 +163,8 @@ def _compensator(form: ControllerForm) -> Declared:
     loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, speed, acceleration, reference_jerk=jerk)
     control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
-    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}  # of limits inside it
+    # within all limits of the controller
+    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}
     symbols = tuple(state.symbol for state in states)
     force, *rates = (sp.sympify(e).subs(within) for e in (control.force, *(state.derivative for state in states)))
     return Declared(symbols, tuple(rates), _CONTROLLER_INPUTS, {FORCE: force})
@@ -172,8 +173,9 @@ def _compensator(form: ControllerForm) -> Declared:
 def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
     """Return the system with the friction law's internal states tied to the stuck cart.
 
-    At rest their rate is proportional to the velocity of the cart alone. They differ from a multiple of its position
-    by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a pole at 0.
+    At rest the rate of these states is proportional to the velocity of the cart alone. So they differ from a multiple
+    of its position by a constant, which depends on where on the rail it got stuck. Nothing controls that constant, and
+    it does not matter; it would be a pole at 0.
     """
     position, velocity = map(system.states.index, cart)
     a, c = system.a.copy(), system.c.copy()
@@ -191,7 +193,7 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
     """Return the system without internal states of the friction law that stay constant.
 
-    An example is the force of an element that slips. Each would be a pole at 0.
+    An example is the force of an element that slips. Such a state would be a pole at 0.
     """
     unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
     moving = [i for i in range(len(system.states)) if i not in unmoved]

@@ -9,7 +9,8 @@ import numpy as np
 from friso.frequency.settings import FrequencySettings
 
 EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
-"""Where a step with an end is divided: evenly, and about the zero of a straight line, as fractions of it."""
+"""Where a step that contains an end is divided: evenly, and near the zero of a straight line, as fractions of the
+step."""
 
 Range = tuple[float, float]
 
@@ -31,7 +32,7 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
 
 
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
-    """Return the zero of the function between two places, at which it has these values."""
+    """Return the zero of a function between two places, from its values at these places."""
     settings = FrequencySettings.current()
     precise = settings.end_precision * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:

@@ -1,9 +1,9 @@
-"""Analyse sampled loops, at one rate or several,
-lifted to the period after which all loops are due again.
+"""Analyse sampled loops, at one rate or several, lifted to their common period.
 
-The controller is that of `friso.equations.sampled`, as a drive computes it. Over a period of N samples the loop is a
-time-invariant system with N inputs and outputs (lifting: Chen, Francis 1995, Optimal Sampled-Data Control Systems,
-chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide on stability.
+After that period all loops are due again. The controller is that of `friso.equations.sampled`, as a drive computes it.
+Over a period of N samples the loop is a time-invariant system with N inputs and outputs (lifting: Chen, Francis 1995,
+Optimal Sampled-Data Control Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide
+on stability.
 
 Cut at the actuator, it has N characteristic loci. A gain or a phase common to all samples brings it to the edge of
 stability where one locus passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217). So margins are
@@ -35,7 +35,8 @@ from friso.stage.standstill import FrictionSettings
 class Lifted:
     """A periodic system at the ends of its periods: x' = a x + b u, y = c x + d u.
 
-    u and y hold the N samples of a period; a (members, n, n), b (members, n, N), c (members, N, n), d (members, N, N).
+    u and y hold the N samples of a period. Shapes are a (members, n, n), b (members, n, N), c (members, N, n), and d
+    (members, N, N).
     """
 
     a: np.ndarray
@@ -50,7 +51,7 @@ class Lifted:
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def over(self, turn: np.ndarray) -> Complex:
-        """Return the matrices where a signal turns by an angle (k,) [rad] in a sample."""
+        """Return the matrices at the frequency at which a signal turns by `turn` [rad] (k,) in a sample."""
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
@@ -61,7 +62,10 @@ class Lifted:
         return _fundamental(self.over(turn), turn)
 
     def locus(self, turn: np.ndarray) -> Complex:
-        """Return the characteristic locus that belongs to the loop at that frequency, shape (members, k)."""
+        """Return the characteristic locus that follows the response of the loop, shape (members, k).
+
+        It is evaluated at the frequency at which a signal turns by `turn` [rad] in a sample.
+        """
         return locus_of(self.over(turn), turn)
 
 
@@ -87,7 +91,7 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
     """Return the controller at each sample of a period.
 
-    Its inputs are the measured position and the position whose rate is the measured velocity [m], its outputs the force
+    Its inputs are the measured position and the position from which the velocity is taken [m], its outputs the force
     [N] and the numbers held for the next sample. A controller that feeds back one encoder's position does not use the
     second input.
     """
@@ -109,7 +113,7 @@ def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tu
 
 
 def _samples(flat: Mapping[str, Any], name: str) -> int:
-    """Return the samples after which a loop is due again."""
+    """Return the number of samples after which a loop is due again."""
     key = f"drive.{name}_sample_time"
     return round(float(flat[key] / flat["drive.sample_time"])) if key in flat else 1
 
@@ -173,7 +177,7 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
     """Lift a system over a period, from its samples: x' = step x + push u, y = answer x."""
     count, (members, n) = len(steps), steps[0].shape[:2]
     along = np.broadcast_to(np.eye(n), (members, n, n))
-    inputs = np.zeros((members, n, count))  # from the inputs so far to the state
+    inputs = np.zeros((members, n, count))  # from the inputs so far to the present state
     c, d = np.zeros((members, count, n)), np.zeros((members, count, count))
     for k, (step, push, answer) in enumerate(zip(steps, pushes, answers, strict=True)):
         c[:, [k]], d[:, [k]] = answer @ along, answer @ inputs
@@ -185,7 +189,7 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
     """Return how the states of plant and controller change over a sample.
 
-    `shut` is 1 if the controller's force acts.
+    `shut` is 1 if the loop is closed, so that the controller's force acts.
     """
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))

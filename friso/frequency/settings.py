@@ -18,7 +18,8 @@ class FrequencySettings(Settings):
     """Points of a curve. Fewer show corners on a screen; more make the page larger."""
 
     unseen_pole: float = setting(1e-7, "")
-    """Largest pole, over the fastest, that is a position or its integral, which the velocity loop does not affect."""
+    """Largest pole, relative to the fastest, that counts as 0. It belongs to the position or its integral, which the
+    velocity loop does not affect."""
 
     lowest_crossover: float = setting(0.1, "Hz")
     """Lowest crossover of the search. Slower loops settle after the moves of any stage."""
@@ -39,7 +40,8 @@ class FrequencySettings(Settings):
     """Relative distance from the end of a range at which a crossover is certainly beyond it."""
 
     logarithm_nudge: float = setting(1e-5, "")
-    """Change of a logarithm for derivatives. Smaller ones drown in the error of the describing function."""
+    """Step in the logarithms of amplitude and frequency for numerical derivatives. Smaller steps drown in the error of
+    the describing function."""
 
     balance_newton_steps: int = setting(20, "")
     """Newton steps after which a balance does not converge."""
@@ -51,7 +53,7 @@ class FrequencySettings(Settings):
     """Relative residual of a solution, the accuracy of the describing functions."""
 
     grid_halvings: int = setting(12, "")
-    """Halvings of the grid, after which a resonance has no damping."""
+    """Halvings of the grid. A resonance that needs more has no damping."""
 
     amplitudes_per_decade: int = setting(32, "1/decade")
     """Amplitudes per decade. Fewer step over two roots that lie close together."""
@@ -87,7 +89,7 @@ class FrequencySettings(Settings):
     """Newton steps after which a series does not converge."""
 
     series_step: float = setting(1e-9, "")
-    """Step relative to the amplitude that is rounding."""
+    """Step, relative to the amplitude, below which a change is only rounding."""
 
     longest_step_share: float = setting(0.5, "")
     """Longest step relative to the amplitude. A longer one jumps to another solution, or to rest."""
@@ -105,7 +107,7 @@ class FrequencySettings(Settings):
     """Largest gap of a periodic state at any tolerance, which shows in the third digit of stiffness."""
 
     secant_steps: int = setting(12, "")
-    """Secant steps after which states repeat only after several periods."""
+    """Most secant steps. States that need more repeat only after several periods."""
 
     least_secant: float = setting(1e-4, "")
     """Least distance of the points of a secant. Closer ones differ by errors of the runs."""
@@ -123,17 +125,17 @@ class FrequencySettings(Settings):
     """Damping ratio below which a pole has a peak that a frequency grid could miss."""
 
     pade_order: int = setting(4, "")
-    """Order of the rational function of a delay. With the phase below, its error stays under 1e-6; a higher order is
-    ill-conditioned."""
+    """Order of the rational function of a delay. With the phase `pade_phase`, its error stays under 1e-6; a higher
+    order is ill-conditioned."""
 
     pade_phase: float = setting(2.5, "rad")
-    """Phase that one rational function of that order covers."""
+    """Phase that one rational function of `pade_order` covers."""
 
     least_delay_phase: float = setting(5.0, "rad")
-    """Least phase covered by the rational functions. With less their poles lie too near those of the loop."""
+    """Least phase covered by the rational functions. With less, their poles lie too near the loop's poles."""
 
     most_delay_phase: float = setting(20.0, "rad")
-    """Largest phase of a resonance within the delay. A loop with more is unstable anyway."""
+    """Largest phase of a resonance within the delay. A loop with more is unstable in any case."""
 
     most_delay_sections: int = setting(24, "")
     """Most rational functions of a delay. More make the eigenvalues inaccurate."""
@@ -145,7 +147,7 @@ class FrequencySettings(Settings):
     """Members computed together. Larger arrays leave the processor's cache."""
 
     family_density: int = setting(35, "1/decade")
-    """Frequencies per decade for a family. Fewer miss which member is closest; its margin is then computed exactly."""
+    """Frequencies per decade for a family. They find the closest members, whose margins are then computed exactly."""
 
     members_solved_whole: int = setting(16, "")
     """Members for which all frequencies are solved at once, limited by memory."""
@@ -184,7 +186,7 @@ class FrequencySettings(Settings):
     """Pole over the fastest that is 0 within rounding."""
 
     rest_frequency: float = setting(1e-6, "")
-    """Frequency, relative to the loop's, at which a finite loop no longer changes."""
+    """Frequency, relative to the loop's, below which a finite loop no longer changes."""
 
     real_share: float = setting(1e-9, "")
     """Imaginary over real part that may be rounding."""

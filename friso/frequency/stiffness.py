@@ -1,4 +1,7 @@
-"""Compute springs in series: joint and bearing before sliding (thesis, Eq. 1), and the touched limiter of Table 1."""
+"""Compute springs in series: joint and bearing (thesis, Eq. 1), and the touched limiter of Table 1.
+
+The bearing acts as a spring before it slides.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ def in_series(first: Any, second: Any) -> Any:
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with its joint replaced by joint and limiter in series, as Table 1 of the thesis prints.
+    """Return the stage with joint and limiter in series in place of its joint, as Table 1 prints.
 
     Stiffness and damping are k1 k2 / (k1 + k2), and the limiter never touches.
     """
     pairs = {"stiffness": "limiter_stiffness", "damping": "limiter_damping"}
-    free = {"joint.stroke": 1.0}  # however long: it is not touched
+    free = {"joint.stroke": 1.0}  # so long that the limiter does not touch
     return {**flat, **free, **{f"joint.{a}": _printed(flat, a, b) for a, b in pairs.items() if f"joint.{a}" in flat}}
 
 

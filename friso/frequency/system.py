@@ -1,4 +1,4 @@
-"""Represent many linear systems of one kind at once, as arrays with the members first."""
+"""Represent many linear systems of one kind at once, as arrays with one member per row."""
 
 from __future__ import annotations
 

@@ -34,10 +34,10 @@ from friso.stage.motion import motion_of
 class Kick:
     """Kicks that start hunting of a stage at rest at its reference.
 
-    A kick is a displacement [m] of everything, followed by a release as in the motion "release", or a push, a velocity
-    [m/s] of all masses. `windows` are the ranges of kicks that start hunting, with ends known to 1 %. The last window
-    may end with the range `searched`. `unknown` counts runs that were not completed; they are left out, so a window may
-    reach across them.
+    A kick is either a displacement [m] of all masses, followed by a release as in the motion "release", or a push: a
+    velocity [m/s] of all masses. `windows` are the ranges of kicks that start hunting, with ends known to 1 %. The last
+    window may end with the range `searched`. `unknown` counts runs that were not completed; they are left out, so a
+    window may reach across them.
     """
 
     windows: tuple[tuple[float, float], ...]
@@ -54,7 +54,7 @@ class Kick:
 class MoveShare:
     """Fraction of moves that end in hunting.
 
-    `count` moves were drawn evenly over two keys of the motion, with the `ranges` [SI], and run to their end; `hunting`
+    `count` moves were drawn evenly over two keys of the motion, within `ranges` [SI], and run to their end; `hunting`
     of them hunt.
     """
 
@@ -78,12 +78,12 @@ def ends_in(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run stages, and find which of them end in one of their attractors.
 
-    The stages are flat keys to SI numbers or arrays (count,). Long after its motion, a run in an attractor swings by at
-    least half of the smallest attracting swing, peak to peak. Returns which runs end there, which were completed, and
-    the peak-to-peak swing [m] at the end, all of shape (count,).
+    The stages are flat keys to SI numbers or arrays (count,). A run ends in an attractor if, long after its motion, it
+    swings by at least half of the smallest attracting swing, peak to peak. Returns which runs end there, which were
+    completed, and the peak-to-peak swing [m] at the end, all of shape (count,).
 
-    `target` is common to all runs, or has one row for each. Where its swings were only observed, half of each run is
-    inspected, because it may swing less often. `options` are those of `RunOptions`.
+    `target` is common to all runs, or has one row for each. Where swings were only observed, half of each run is
+    inspected, because the swing may come less often. `options` are those of `RunOptions`.
     """
     ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
     observed = np.broadcast_to(target.observed, (count,))
@@ -141,7 +141,7 @@ def _ends_observed(
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
     """Return which runs swing as far as an observed attractor, but not within its last period.
 
-    How such runs of `ends_in` end is unknown.
+    It is unknown whether such runs end in the attractor.
     """
     return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 
@@ -180,9 +180,9 @@ def _caught(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which runs end in an attractor, and for which this is known, both (count,).
 
-    The return map decides where it is reliable, long runs elsewhere. A run that swings by more than `widest` at its
-    end, peak to peak [m], may grow or decay, so its end is unknown. So is that of a run that swings less often than an
-    observed attractor.
+    The return map decides where it is reliable, long runs elsewhere. The end of a run is unknown if at its end the run
+    swings by more than `widest`, peak to peak [m], because it may then grow or decay. It is also unknown if the run
+    swings less often than an observed attractor.
     """
     ends, decided = np.zeros(count, bool), np.zeros(count, bool)
     if landing_map is not None:

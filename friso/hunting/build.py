@@ -1,5 +1,7 @@
-"""Build the compiled `friso.hunting.turning`,
-in the process that fills the cache (`friso.engine.builder`)."""
+"""Build the compiled `friso.hunting.turning`.
+
+This runs in the process that fills the cache (`friso.engine.builder`).
+"""
 
 from __future__ import annotations
 

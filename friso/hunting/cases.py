@@ -110,7 +110,7 @@ class Case:
 
     @property
     def runs_away(self) -> bool:
-        """Tell whether the motion diverges because the loop is unstable, so that there is no other verdict."""
+        """Tell whether the motion diverges because the loop is unstable; there is then no other verdict."""
         return self.verdict == "failed" and self.judgement.runs_away
 
     @property
@@ -130,7 +130,7 @@ PART_COUNT = len(PARTS) + 1
 
 
 LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
-"""Relative tolerance of runs that only show how a motion ends; runs that give times are finer."""
+"""Relative tolerance of runs that only show how a motion ends. Runs from which times are taken are finer."""
 
 
 def check(
@@ -158,7 +158,7 @@ def check(
     done = Tally(progress, len(different) * PART_COUNT)
 
     def judged(variant: Stage) -> Case:
-        """Check a variant of the stage with its fraction of the work."""
+        """Check a variant of the stage within its fraction of the work."""
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
         return _case(
@@ -237,7 +237,8 @@ def _case(
         if static_friction and static_friction.open_sides:
             judgement = replace(judgement, given_up=(*judgement.given_up, CheckPart.FRICTION))
     breakaway = _breakaway(flat)
-    done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)  # the last, too, where nothing attracts
+    # parts left out without an attractor count as done, too
+    done.add(PART_COUNT - ended, CheckPart.FRICTION.progress_word)
     return Case(
         stage=stage,
         judgement=judgement,
@@ -273,7 +274,7 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 
 
 def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
-    """Return the margin in static friction, and whether the advised bandwidth keeps a margin.
+    """Return the margin in static friction, and whether it holds at the advised bandwidth.
 
     Each part has an allowance of work and is None if that does not suffice.
     """
@@ -292,8 +293,8 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
     """Return the force limit [N] that holds a stage off its reference for ever, or None.
 
-    It does if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. A stage
-    that settles, swings, or may still move gives None.
+    The limit does so if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. A
+    stage that settles, swings, or may still move gives None.
     """
     settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible

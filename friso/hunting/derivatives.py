@@ -51,7 +51,7 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
     system = np.zeros((size + 1, size + 1))
     system[:size, :size] = sign * by_states - np.eye(size)
     system[:size, size] = stages.rates(sign * ends[None])[0]
-    system[size, stages.integral] = 1.0  # the section: period and amplitude do not depend on it
+    system[size, stages.integral] = 1.0  # phase condition: period and amplitude do not depend on it
     moved = np.linalg.solve(system, np.vstack([-sign * by_keys, np.zeros(len(keys))]))
     halves = 2.0 if sign < 0 else 1.0
     extremes = _extremes(stages, keys, orbits, moved[:size], rtol)
@@ -111,7 +111,7 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """Return the relative change of the edge of hunting in bandwidth per relative change of each key, (keys,).
+    """Return how the edge of hunting in bandwidth depends on each key, (keys,): relative change per change.
 
     The edge lies at `factor` times the bandwidth of the stage, everything else unchanged. Along the edge the multiplier
     keeps its value; its derivatives are central differences of an exact derivative of the flow. Returns None if no
@@ -141,7 +141,7 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """Return the multipliers of stages that differ slightly from the stage with the cycle `first`, (stages,).
+    """Return the multipliers, (stages,), of stages that differ slightly from the stage of the cycle `first`.
 
     Returns None if an orbit could not be closed, or a multiplier is complex.
     """

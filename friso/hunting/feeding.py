@@ -23,11 +23,11 @@ from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
 
 @dataclass(frozen=True)
 class Decline:
-    """Decline of hunting as one cause is scaled down.
+    """How hunting declines as one cause is scaled down.
 
-    `lasts` is the smallest scale at which the stage still hunts. `gone` is the largest scale below it at which it does
-    not: None if it hunts down to the last scale, and 0 if the cycle shrinks in proportion to its cause. `certain` tells
-    whether all surveys were certain.
+    `lasts` is the smallest scale at which the stage still hunts. `gone` is the largest scale below `lasts` at which it
+    does not hunt: None if it hunts down to the last scale, and 0 if the cycle shrinks in proportion to its cause.
+    `certain` tells whether all surveys were certain.
     """
 
     lasts: float
@@ -42,7 +42,7 @@ class Decline:
 
 @dataclass(frozen=True)
 class Feeding:
-    """How hunting declines without dry friction (None: there is no dry friction) and without backlash."""
+    """How hunting declines when dry friction (None: there is none) or the backlash is scaled down."""
 
     friction: Decline | None
     backlash: Decline
@@ -72,7 +72,7 @@ def _without_friction(stage: Stage) -> Decline:
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the keys that scale the dry friction of guide and motor.
 
-    They are the forces, and the stiffnesses, so that bristles become softer in proportion.
+    They are the friction forces and the bristle stiffnesses, so that bristles become softer in proportion.
     """
     units = {key: field.unit for key, field in declared_keys(flat).items() if key in flat}
     tables = ("friction.", f"{MOTOR_FRICTION}.")

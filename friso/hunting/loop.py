@@ -1,4 +1,7 @@
-"""Judge the stability of a stage's loop without friction: if it is unstable, tuning is the cause, not friction."""
+"""Judge the stability of a stage's loop without friction.
+
+If the loop is unstable, tuning is the cause of swinging, not friction.
+"""
 
 from __future__ import annotations
 
@@ -90,7 +93,7 @@ def _at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:
-    """Return the states in which the loop is unstable, with the limiter untouched.
+    """Return the states in which the loop is unstable while the stroke limiter is not touched.
 
     The stage either sticks, held by its bristles, or slides with only viscous friction.
     """
@@ -100,7 +103,7 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 def leaves_for_good(stage: Stage) -> bool:
     """Tell whether a stage that has left the range of all runs diverges for ever.
 
-    It does if the loop is unstable and no force limit with anti-windup can hold it in a larger swing.
+    It does if the loop is unstable and no force limit with anti-windup can catch it in a larger swing.
     """
     stages = Ensemble.held(stage.flat(), 1)
     controller = stages.structure.controller
@@ -137,15 +140,16 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
         return np.zeros(stages.count, bool)
     limit = least_rate * stages.number("rate")
     growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]
-    stable = np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
+    stable = np.all([growth <= limit for state in growths for growth in state], axis=0)  # NaN counts as unstable
     return stable & ~may_run_away(stages) & ~lags(stages)
 
 
 def lags(stages: Ensemble) -> np.ndarray:
     """Return which stages have a controller that lags instead of integrating, shape (count,).
 
-    At standstill its force keeps growing, although it has no integral: below the crossover the force comes behind the
-    error, which feeds a swing. A controller whose force never does so below the crossover only takes energy out.
+    At standstill the force of such a controller keeps growing, although it has no integral: below the crossover the
+    force comes behind the error, which feeds a swing. A controller whose force never lags below the crossover only
+    takes energy out.
     """
     at_once, controller = CheckSettings.current().loops_at_once, stages.structure.controller
     lagging = np.zeros(stages.count, bool)
@@ -222,7 +226,7 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the linear system of a sliding stage with viscous friction only, without states of the friction law.
+    """Return the linear system of a sliding stage, with viscous friction and no states of the friction law.
 
     `of_directions` combines the viscous friction of the two directions.
     """
@@ -248,7 +252,7 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """Return how much friction rises with speed [N s/m] beyond a high speed [m/s], (count,)."""
+    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,)."""
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 

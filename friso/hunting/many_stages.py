@@ -46,9 +46,8 @@ class StageAttractors(ArrayRows):
     - `decided`: every simulation that had to decide was completed.
     - `certain`: decided, and no attractor can exist beyond the range searched.
     - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: no attractor).
-    - `closed`: the largest swing was closed as an orbit; `multiplier`: of this orbit (NaN: it was not).
-    - `target`: the motion in which all motions end that do not come to rest (None: stages of this structure cannot
-      hunt).
+    - `closed`: the largest swing was closed as an orbit; `multiplier`: its multiplier (NaN: it was not closed).
+    - `target`: the motion that marks a run as hunting (None: stages of this structure cannot hunt).
     """
 
     attracts: np.ndarray
@@ -71,7 +70,7 @@ class StageAttractors(ArrayRows):
         if survey is None:
             nothing, decided = np.zeros(count, bool), np.ones(count, bool)
             return cls(nothing, decided, certain, closed, amplitude, period, multiplier, None)
-        for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest last
+        for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest swing comes last
             k, orbit = motion.stage, motion.cycles
             closed[k], amplitude[k], period[k] = orbit is not None, motion.amplitude, motion.period
             multiplier[k] = np.nan if orbit is None else orbit.multiplier[motion.number]
@@ -185,7 +184,7 @@ def judge_runs(
         in_cycle[chosen], decided[chosen] = ends, completed
         settled = np.isfinite(motions.settling[chosen]) & (swing <= resting(flat, count)[chosen])
         restless = chosen[completed & ~ends & ~settled]
-        if restless.size:  # something may attract them that swings less than what was found
+        if restless.size:  # another attractor may swing less than the one that was found
             moved = some_of(flat, restless), motions.take(restless)
             in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
     free = np.flatnonzero(decided & ~attracts)
@@ -202,7 +201,8 @@ def judge_runs(
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
     """Continue motions that do not end in an attractor of their stages.
 
-    Returns which of them swing on by less, and which certainly swing on or rest, both of shape (motions,).
+    Returns which of them keep swinging with a smaller swing, and which certainly keep swinging or rest, both of shape
+    (motions,).
     """
     rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
     return rest.steady, rest.steady | _stands(flat, rest)

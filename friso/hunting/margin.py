@@ -71,14 +71,14 @@ class SearchedBandwidths:
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
-"""Result for a stage that cannot hunt at any bandwidth."""
+"""Result for a stage that cannot hunt at any bandwidth, so that no search is needed."""
 
 
 def find_margin(stage: Stage, attracting: bool) -> Margin | None:
     """Find the edge of hunting of a stage, whatever its own motion.
 
-    If the stage hunts (`attracting`), it is the last edge above its bandwidth, else the next one below. Returns None if
-    there is no edge in the range searched.
+    If the stage hunts (`attracting`), it is the last edge above its bandwidth, else the nearest one below. Returns None
+    if there is no edge in the range searched.
     """
     return search_bandwidths(stage, attracting).margin
 
@@ -86,8 +86,8 @@ def find_margin(stage: Stage, attracting: bool) -> Margin | None:
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
     """Search the bandwidths of `SEARCH_LIMITS` for attractors.
 
-    `survey` is the survey of the stage itself, if there was one. If an allowance of work is used up, ends are as known
-    by then, and not certain.
+    `survey` is the survey of the stage itself, if there was one. If an allowance of work is used up, the ends are as
+    good as known by then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
@@ -105,7 +105,8 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     grid.search_below()
     edge = edge or grid.last_edge(index, attracting)
     lower = grid.lower_end(index) if attracting else None
-    windows = grid.windows(index if edge is None else edge[0])  # these may be followed to the stage itself
+    # a cycle of a window may be followed to the stage itself
+    windows = grid.windows(index if edge is None else edge[0])
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
         to_the_top = bool((grid.attracts & grid.decided)[index:].all())
@@ -158,11 +159,12 @@ class _Grid:
                     survey = attractors(self._stages(some), cycles=False)
                     self.attracts[some], self.decided[some] = survey.attracts, survey.decided
             except Exhausted:
-                if simulated.left < work - simulated.used or np.isinf(work):  # there is less left around this search
+                # the allowance around this search has less left
+                if simulated.left < work - simulated.used or np.isinf(work):
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
-        """Return the stage with its bandwidth multiplied by the factors with these numbers."""
+        """Return the stage with its bandwidth multiplied by the numbered factors."""
         return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
@@ -198,7 +200,7 @@ class _Grid:
     def _proved_at_the_top(self) -> bool:
         """Tell whether the stage hunts at the highest factor.
 
-        If that is undecided when the allowance is used up, the answer is yes.
+        If the allowance is used up before that is decided, the answer is yes.
         """
         try:
             return self.proved(len(self.factors) - 1, 1)
@@ -232,25 +234,26 @@ class _Grid:
             return None
         beyond = ahead * np.log(self.factors / end.inside)
         self._pass((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
-        if ahead * (end.outside - end.inside) <= 0:  # the search was given up beyond it
+        if ahead * (end.outside - end.inside) <= 0:  # the search was given up past `outside`
             settled = np.flatnonzero((beyond > 0) & ~self.attracts)[::ahead]
             if not settled.size:
                 self._pass(beyond > 0)
                 return None
             end = AttractionEnd(end.inside, float(self.factors[settled[0]]), False)
         attracted = np.flatnonzero((ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0))
-        last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at  # within its reserve it may lie before
+        # within its error the end may lie before the first factor
+        last = int(attracted[-1 if ahead > 0 else 0]) if attracted.size else at
         self.ends[at, ahead] = self.ends[last, ahead] = end
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Record an attractor at the factors, shape (count,), past which a stable orbit was followed."""
+        """Mark the factors, shape (count,), past which a stable orbit was followed, as having an attractor."""
         self.passed |= where
         self.attracts |= where
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
-        """Tell whether the stage hunts at a factor, by number, after trying to close orbits.
+        """Tell whether the stage hunts at the factor numbered `at`, after trying to close orbits.
 
         If it does not, the next factors behind it that seemed to have an attractor are inspected too.
         """
@@ -274,7 +277,7 @@ class _Grid:
         self.inspected |= set(numbers.tolist())
 
     def lower_end(self, index: int) -> AttractionEnd | None:
-        """Find the end of attraction below a number.
+        """Find the end of attraction below the factor numbered `index`.
 
         Returns None if attraction reaches the end of the search, or if it is not certain that the stage does not hunt
         below.

@@ -45,7 +45,8 @@ BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
 
 RESOLVED = DISTINCT / 4
-"""Size [m] of swings that are skipped when turning points are stored; peaks, periods and outcomes use larger ones."""
+"""Size [m] below which swings are skipped when turning points are stored; peaks, periods and outcomes need larger
+ones."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
-    """Return the time [s] from which the references of stages stand or move at constant speed, or 0."""
+    """Return the time [s] of the references' last corner; 0 if they move throughout."""
     return np.asarray(last_corner(flat)) if ends_evenly(flat) else 0.0
 
 

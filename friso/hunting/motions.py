@@ -67,11 +67,12 @@ class FollowedMotions:
 
     - `rests`: at rest at the end, within 10 um of the reference.
     - `moving`: not at rest, or still swinging within 10 um.
-    - `after` [s]: time after which it rests when continued (NaN: it does not, or unknown).
-    - `steady`: swings on, neither settling nor decaying.
-    - `followed` [s]: time for which it was continued (NaN: not, or the longer run was not completed).
-    - `swing` [m]: peak to peak of the last quarter of that time.
-    - `away`: diverges from the reference.
+    - `after` [s]: time after which the stage rests if the motion is continued (NaN: it does not rest, or this is
+      unknown).
+    - `steady`: it keeps swinging, neither settling nor decaying.
+    - `followed` [s]: time for which it was continued (NaN: not continued, or the longer run was not completed).
+    - `swing` [m]: peak to peak over the last quarter of that time.
+    - `away`: it diverges from the reference.
     """
 
     rests: np.ndarray
@@ -111,7 +112,7 @@ class FollowedMotions:
 def followed_motions(
     flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool
 ) -> FollowedMotions:
-    """Continue motions that have not come to rest at their end, until an allowance of work is used up.
+    """Continue motions that are not at rest at their end, until an allowance of work is used up.
 
     If hunting is not `possible`, a stage may also rest off its reference.
     """
@@ -123,7 +124,8 @@ def followed_motions(
         return replace(rest, rests=rests | idle)
     rest.moving[:] = ~(rests & (motions.swing <= resting(flat, count)))
     if (moving := np.flatnonzero(rest.moving)).size:
-        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)  # what may leave the band, at the end
+        # turning points that may leave the band at the end
+        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)
         try:
             rest.follow(moving, some_of(flat, moving), moving.size, late)
         except Exhausted:

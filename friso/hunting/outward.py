@@ -2,7 +2,7 @@
 
 A closed orbit is followed through the bandwidth to its end: a flip, a fold, or the loss of the orbit. If another
 attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed,
-surveys between the last bandwidth with an attractor and the next one without narrow down the edge.
+surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 FARTHER = np.array([1.03, 1.06])
-"""Factors beyond the end of an orbit at which attractors are looked for again. Windows to which no orbit leads lie
-there most often, and are narrower than the steps of a search through all bandwidths."""
+"""Factors beyond the end of an orbit at which attractors are looked for again. Most windows to which no orbit leads lie
+there, and they are narrower than the steps of a search through all bandwidths."""
 
 
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
@@ -34,11 +34,11 @@ ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 
 
 @dataclass(frozen=True)
 class AttractionEnd:
-    """Two factors of the bandwidth: with an attractor at `inside` and without one at `outside`.
+    """End of attraction, between two factors of the bandwidth.
 
-    The end is `certain` if an orbit was followed to its end or its loss at `inside`, or an attractor was seen there, no
-    attractor exists at `outside`, all runs decided, and both factors are close together. The end lies between both,
-    with the relative error `reserve`.
+    The stage has an attractor at `inside` and none at `outside`. The end is `certain` under four conditions: an orbit
+    was followed to its end or its loss at `inside`, or an attractor was seen there; no attractor exists at `outside`;
+    all runs decided; and both factors are close together. `reserve` is the relative error.
     """
 
     inside: float
@@ -82,7 +82,7 @@ class Beyond(Exception):
 
 @dataclass(frozen=True)
 class EdgeSearch:
-    """A search for an edge of hunting, towards the `farthest` factor of the bandwidth.
+    """Search for an edge of hunting, towards the `farthest` factor of the bandwidth.
 
     The stage is given as flat keys. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs to
     another window.
@@ -93,7 +93,7 @@ class EdgeSearch:
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """Find the end of attraction, from motions at the factor `at` towards the factor `outside` without any.
+        """Find the end of attraction, from motions at the factor `at` towards `outside`, which has none.
 
         Raises Beyond if an attractor exists up to the end of the search. If an allowance of work is used up, the end is
         as close as known by then, and not certain; attraction may have been followed past `outside`.
@@ -190,8 +190,8 @@ class EdgeSearch:
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
         """Find the attractors at some factors.
 
-        Where maps do not decide, runs also start from `distances` [m], shape (n,). Runs confirm the maps of the factors
-        numbered `confirm`.
+        Where maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered `confirm`,
+        runs check the maps.
         """
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
@@ -205,7 +205,10 @@ class EdgeSearch:
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
-        """Return the factor `outside` without an attractor, or one further ahead if `at` has passed it."""
+        """Return the factor `outside`, or one further ahead if `at` has passed it.
+
+        At `outside` there is no attractor.
+        """
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 

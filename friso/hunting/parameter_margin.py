@@ -15,17 +15,17 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
 SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
-"""Values tried first on either side of the stage's own, as fractions of the logarithm of the farthest factor. They are
-closest together near the stage's own value, and as many as run at once on most processors."""
+"""Values tried first on either side of the stage's own, as fractions of the logarithm of the farthest factor. They lie
+closest together near the stage's own value, and are as many as most processors run at once."""
 
 
 WITHIN = np.array([2, 4])
-"""Numbers of the values, from the stage's own outward, that are searched thoroughly if a rough survey finds no change.
-They are 9 and 23 % off for a farthest factor of three."""
+"""Indices of the values, counted outward, that are searched thoroughly if a rough survey finds no change. They are 9
+and 23 % off for a farthest factor of three."""
 
 
 class Undecided(Exception):
-    """The search could not decide whether attraction changes on a side."""
+    """Error: the search could not decide whether hunting begins or ends on a side."""
 
 
 Scaled = Callable[[np.ndarray], Mapping[str, Any]]
@@ -34,10 +34,10 @@ Scaled = Callable[[np.ndarray], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class MarginEnd:
-    """Two factors of a parameter, close together, between which hunting begins or ends.
+    """End of a margin: two factors of a parameter, close together, between which hunting begins or ends.
 
     From 1 up to `same` the stage hunts, or not, as at its own value; at `other` it does the opposite. The end is
-    `certain` if a closed orbit is stable at one of both, and a completed search finds no attractor at the other.
+    `certain` if a closed orbit is stable at one of the factors, and a completed search finds no attractor at the other.
     """
 
     same: float
@@ -47,10 +47,10 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """Range of a parameter in which a stage keeps hunting, or does not hunt, as it `attracts` or not.
+    """Range of a parameter over which the verdict on a stage stays: it hunts, or it does not.
 
-    `below` and `above` are the nearest factors of the parameter at which that changes (None: at no factor tried up to
-    the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
+    `attracts` tells which. `below` and `above` are the nearest factors of the parameter at which that changes (None: at
+    no factor tried up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
     """
 
     attracts: bool
@@ -75,9 +75,9 @@ class ParameterMargin:
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
     """Find the margin of a stage in a parameter, from the factor `lowest` to the `highest` one.
 
-    `attracts` tells whether the stage itself hunts. Each side is surveyed roughly, at values that are farther apart the
-    farther off they are, then more closely around a change. Both ends are searched thoroughly. Ranges narrower than
-    these steps may be missed. A side is open if an allowance of work is used up, or the search does not decide.
+    `attracts` tells whether the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows
+    outward, then more closely around a change. Both ends are searched thoroughly. Ranges narrower than these steps may
+    be missed. A side is open if an allowance of work is used up, or the search does not decide.
     """
     settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
@@ -99,8 +99,8 @@ def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: flo
 class _Side:
     """Factors of a parameter on one side of its own value, from 1 outward, with results.
 
-    `changed`: hunting has begun or ended. `decided`: this is known. `searched`: the stage was searched thoroughly.
-    `certain`: the thorough search was certain.
+    `changed`: hunting has begun or ended. `decided`: it is known whether it has. `searched`: the stage was searched
+    thoroughly. `certain`: the thorough search was certain.
     """
 
     def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
@@ -133,7 +133,7 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """Return the number of the first changed factor, after trying others close to it; None if nothing changes."""
+        """Return the number of the first factor with a change, after trying others close to it, or None."""
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
@@ -143,12 +143,12 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Return factors between the first changed one and the one before it."""
+        """Return factors between the first one with a change and the one before it."""
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """Choose the two factors, by number, to search thoroughly around the first changed one.
+        """Choose the two factors, by number, to search thoroughly around the first one with a change.
 
         Their distances from it are `proved_distances`: close to the end of hunting, motions take long to decay, and a
         rough survey may be wrong. New factors are surveyed roughly.

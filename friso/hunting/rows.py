@@ -1,5 +1,4 @@
-"""Base for results of many stages or runs: arrays with one row each,
-from which rows can be selected."""
+"""Base for results of many stages or runs: arrays with one row each, from which rows can be selected."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ class ArrayRows:
     """
 
     def take(self, numbers: Any) -> Self:
-        """Select the rows with these numbers, any of them as often as wanted."""
+        """Select the rows with these numbers; a number may occur several times."""
         parts = {part.name: _rows_of(getattr(self, part.name), numbers) for part in fields(self)}  # type: ignore[arg-type]
         return replace(self, **parts)  # type: ignore[type-var]
 

@@ -21,8 +21,8 @@ class ToleranceSettings(Settings):
     """Tolerance of runs that start Newton's method. Looser ones miss narrow cycles."""
 
     survey_rtol: float = setting(1e-7, "")
-    """Tolerance of surveys. In looser runs rounding breaks stuck stages away; tighter ones take longer with equal
-    results."""
+    """Tolerance of surveys. In looser runs rounding errors break stuck stages away; tighter ones take longer and give
+    equal results."""
 
     tight_survey_rtol: float = setting(1e-9, "")
     """Tolerance of repeated runs where only simulations show an attractor. A looser one would be no second opinion."""
@@ -123,7 +123,7 @@ class EdgeSettings(Settings):
     """Step in bandwidth with a chattering limiter. Shorter steps follow the roughness of multipliers."""
 
     beyond_edge_factor: float = setting(1.0095, "")
-    """First factor beyond an edge at which no attractor may exist. The edge is known to a hundredth."""
+    """First factor beyond an edge at which no attractor may exist. It makes the edge accurate to one per cent."""
 
     most_orbits_followed: int = setting(8, "")
     """Most orbits followed one after the other. More than eight in a row were not met."""
@@ -135,7 +135,7 @@ class EdgeSettings(Settings):
     """Steps in which a bracket is divided. More take more surveys at once, fewer take more rounds."""
 
     reach_log: float = setting(0.06, "log of bandwidth")
-    """First distance ahead at which attractors are looked for, doubled each time."""
+    """First distance ahead at which attractors are looked for. It doubles each time."""
 
     simulated_work: float = setting(1e8, "")
     """Work for simulations at bandwidths without a map. The rest of a check needs work too."""
@@ -216,17 +216,18 @@ class CheckSettings(Settings):
     """Slowest growth rate that is not rounding. A stage that sticks has poles at 0."""
 
     lag_angle: float = setting(1e-3, "rad")
-    """Phase lag of the force behind the error from which a controller is a lag. Its static gain then exceeds that of a
-    slip by a few thousandths, which stops even on a Coulomb level of a hundredth of the static one."""
+    """Phase lag of the force behind the error from which a controller counts as a lag. With a smaller one, the force at
+    standstill exceeds the force of a slip by only a few thousandths, so the slip stops even if Coulomb friction is a
+    hundredth of static friction."""
 
     lag_rates: tuple[float, float] = setting((1e-6, 30.0), "natural frequencies")
-    """Lowest and highest rate at which lags are looked for. A slower one rises too slowly to break a stage away."""
+    """Lowest and highest rate at which lags are looked for. A slower lag rises too slowly to break a stage away."""
 
     lag_points: int = setting(200, "")
     """Rates at which the phase is computed: 27 per decade, finer than any lag."""
 
     viscous_speed: float = setting(1e3, "loop speeds")
-    """Speed by which friction that falls with speed has become viscous."""
+    """Speed, in units of the loop's, at which friction that falls with speed has become viscous."""
 
     lower_gain_shares: tuple[float, float, int] = setting((1e-06, 1.0, 37), "")
     """First and last gain, and number of gains, at which stability is computed: twelve per decade."""
@@ -252,7 +253,7 @@ class TrackingSettings(Settings):
     """Settings of responses to references that keep moving."""
 
     samples_of_a_period: int = setting(4000, "")
-    """Samples of a period. Fewer miss the tip of an error behind a reversal; more take memory."""
+    """Samples of a period. Fewer miss the peak of an error behind a reversal; more take memory."""
 
     closing_rounds: int = setting(30, "")
     """Newton steps, or equal waits, after which a periodic response is abandoned."""

@@ -52,7 +52,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
 
 
 def _is_known(judgement: Judgement) -> bool:
-    """Tell whether the attractors of a stage that may hunt are known."""
+    """Tell whether it is known if the stage has attractors, for a stage that may hunt."""
     hunting, unclear = judgement.hunting, judgement.observed and judgement.hunting.target is None
     failed = judgement.verdict == "failed" or judgement.runs_away or hunting.passing
     return hunting.possible and hunting.certain and not failed and not unclear
@@ -65,10 +65,10 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether a stage with a faster controller does not hunt with more or less static friction.
+    """Tell whether a stage with a faster controller still does not hunt if static friction changes.
 
-    The controller is faster by `factor`; static friction changes by the factor by which advice keeps away from an edge.
-    Returns None if this takes more than the given work, or is not certain.
+    The controller is faster by `factor`; static friction is multiplied and divided by the factor by which advice keeps
+    away from an edge. Returns None if this takes more than the given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

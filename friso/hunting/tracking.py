@@ -82,7 +82,7 @@ class Tracking:
 def dwells(stage: Stage, rtol: float) -> tuple[Dwell, ...]:
     """Return how a stage settles at each place where its reference stands, the slowest first.
 
-    The motion is run as far as the end of each stand, side by side.
+    Runs of the motion up to the end of each stand are computed side by side.
     """
     flat = stage.flat()
     places = motion.stands(flat)
@@ -127,8 +127,8 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
     """Return how a stage follows a reference that keeps moving; None if its run was not completed.
 
-    For a periodic reference, the response of equal period is closed by Newton's method on the states one period later,
-    from the end of the stage's own motion.
+    For a periodic reference, Newton's method closes the response of equal period, from the end of the stage's own
+    motion. The residual is the difference between states one period apart.
     """
     flat, settings = stage.flat(), TrackingSettings.current()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
@@ -137,7 +137,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     end = ends
     if period is not None and period <= end and (orbit := _closed(shape, flat, period, rtol)) is not None:
         start, multiplier = orbit
-        begins, ends, end = 0.0, period, 2 * period  # the error behind the last reversal reaches into the next period
+        begins, ends, end = 0.0, period, 2 * period  # the error behind the last reversal lasts into the next period
     interval = (ends - begins) / settings.samples_of_a_period
     options = RunOptions(rtol=rtol, interval=interval, record_from=np.inf, least_swing=np.inf)
     (runs,) = run_chunks(shape, {**flat, DURATION: end}, 1, options, start)
@@ -159,7 +159,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
 def _reversals(
     flat: Mapping[str, Any], time: np.ndarray, error: np.ndarray, span: tuple[float, float]
 ) -> tuple[Reversal, ...]:
-    """Return the turning points of a reference in a time span, each with the error behind it."""
+    """Return the reversals of a reference in a time span, each with the error behind it."""
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
     reversals = []
     for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):

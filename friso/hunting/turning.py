@@ -1,8 +1,7 @@
-"""Count peaks, and find periods and swings of runs from their turning points,
-as plain loops over runs.
+"""Count peaks, and find periods and swings of runs from their turning points.
 
-A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` compiles it
-(`friso.engine.scalar_code`).
+These are plain loops over runs. A few runs are scanned by this module as it stands. For many, `friso.hunting.turns`
+compiles it (`friso.engine.scalar_code`).
 """
 
 import numpy as np
@@ -75,7 +74,7 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks: of late and tall maxima, the tallest within `SEPARATION`.
+    """Mark the counted peaks among late and tall maxima: within `SEPARATION` only the tallest counts.
 
     MATLAB's findpeaks does so with MinPeakDistance.
     """
@@ -96,11 +95,12 @@ def keep_tallest(times, values, count, kinds, peaks):
 
 
 def mean_period(times, count, kinds, ended):
-    """Return the mean time between maxima of a zigzag, or else minima, in the last quarter [s].
+    """Return the mean time [s] between maxima of a zigzag in the last quarter, or else between minima.
 
-    A slower swing gives the time between the last two of the last half. NaN if there are no two of a kind.
+    A slower swing gives the time between the last two extrema of a kind in the last half. The result is NaN if there
+    are no two of a kind.
     """
-    last = -1  # its swing is not over yet
+    last = -1  # the last swing is not over yet
     for k in range(count):
         if kinds[k] != 0:
             last = k

@@ -48,10 +48,10 @@ MOVING = "the reference never stands still"
 
 
 LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
-"""Reason given when a motion that does not end in a known attractor may end in another one."""
+"""Reason given when a motion that ends in no known attractor may end in another one."""
 
 SWINGS_ON = "this motion was still swinging when it was given up, by less than half of what was found to attract"
-"""Reason given when a motion was seen to swing on by less than the known attractor."""
+"""Reason given when a motion was seen to keep swinging, by less than the known attractor."""
 
 STILL_SWINGS = "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
 
@@ -75,11 +75,11 @@ UNCHECKED = "runs with hardly different masses, which show whether chance decide
 
 
 class CheckPart(StrEnum):
-    """A part of a check, reported as it begins, and by name if it runs out of work (`Judgement.given_up`).
+    """Part of a check: reported as it begins, and by name if it runs out of work (`Judgement.given_up`).
 
-    The first three are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS` replaces
-    `BANDWIDTHS` if the stage hunts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING` for a
-    hunting stage with a backlash.
+    The first three parts are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS`
+    replaces `BANDWIDTHS` if the stage hunts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING`
+    for a hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -159,8 +159,8 @@ def judge(
     """Judge a stage whose motion was run and measured at a relative tolerance.
 
     `begin` is called as each part begins (see `CheckPart`). `tell` is called with the verdict as soon as it is certain.
-    Kicks and other bandwidths follow, and a cycle followed from another bandwidth may still contradict the verdict.
-    Anything that so much `work` does not decide (see `friso.engine.allowance`) is not certain.
+    Kicks and other bandwidths are searched afterwards; a cycle followed from another bandwidth may still contradict the
+    verdict. Parts that `work` does not suffice for (see `friso.engine.allowance`) are not certain.
     """
     settings = CheckSettings.current()
     work = settings.check_work if work is None else work
@@ -275,7 +275,7 @@ def _with_a_target(
 
 @dataclass(frozen=True)
 class OwnMotion:
-    """End of a stage's own motion.
+    """How a stage's own motion ends.
 
     It `ends` in the attractor or not, its run was `completed`, and `swing` [m] is its final peak-to-peak swing. `doubt`
     is the reason why this is uncertain, "" for none: a tiny change of mass may change the end.
@@ -288,10 +288,10 @@ class OwnMotion:
 
 
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
-    """Run the stage's own motion, also with slightly different masses, and find how it ends (see `ends_in`).
+    """Run the stage's own motion, also with slightly different masses, and find how it ends.
 
-    A motion that still swings, but less far or less often than the attractor, may be decaying. It is continued if the
-    given work suffices.
+    `ends_in` decides. A motion that still swings, but less far or less often than the attractor, may be decaying. It is
+    continued if the given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()
@@ -329,11 +329,11 @@ def _starts(
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
     """Find the kicks and moves that start hunting, within some work.
 
-    Also returns the part that ran out of work.
+    Returns both kicks and the moves, and the part that ran out of work, if any.
     """
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
-    if attraction.passing:  # what swings less at its end may be passing as well
+    if attraction.passing:  # a swing that is smaller at its end may be transient as well
         return starts, ()
     widest = np.inf if attraction.lower_gains is None else settings.runaway_swing_factor * _widest(attraction)
     try:
@@ -353,7 +353,7 @@ def _starts(
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
     """Return why a motion outside the known attractor may not come to rest; "" if it does.
 
-    `swing` [m] is its final peak-to-peak swing; `within` [s] the time from which on it stays near its reference (NaN:
+    `swing` [m] is its final peak-to-peak swing; `within` [s] is the time from which it stays near its reference (NaN:
     not within its run).
     """
     if swing > resting(stage.flat())[0]:
@@ -380,7 +380,7 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """Limit the certainty of a search's ends to that of the verdict.
+    """Mark the ends of a search as no more certain than the verdict.
 
     Ends are uncertain where the stage may diverge.
     """

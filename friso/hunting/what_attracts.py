@@ -1,5 +1,7 @@
-"""Find the attractors of stages by their return maps,
-and by a search from many starts where a map does not decide."""
+"""Find the attractors of stages by their return maps.
+
+Where a map does not decide, stages are searched from many starts.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,7 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 def what_attracts(
     stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
-    """Find the attractors of stages that may hunt, as closed orbits; by return maps where these are resolved.
+    """Find the attractors of stages that may hunt, as closed orbits; by return maps where resolved.
 
     A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
     stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
@@ -49,7 +51,7 @@ def what_attracts(
     if not has_a_map(stages):
         return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
     survey = survey_maps(stages, rtol)
-    decided = survey.resolved | survey.attracts  # a closed orbit that attracts is a proof
+    decided = survey.resolved | survey.attracts  # a stable closed orbit proves attraction
     quiet = np.array([number for number in confirm if decided[number] and not survey.attracts[number]], dtype=np.int64)
     if quiet.size:
         decided[quiet] = runs_land_as_foretold(survey, quiet)
@@ -85,7 +87,7 @@ class _Cycles(ArrayRows):
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
         """Add lasting motions beside the unstable orbits that a survey of maps closed.
 
-        They are added for the stages with these numbers.
+        The numbers are those of the surveyed stages.
         """
         more = [np.full((len(numbers), 1), np.nan)]
         for motion in survey.repelling:
@@ -186,8 +188,8 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 def _hardly_attracts(landing_map: LandingMap) -> bool:
     """Tell whether a coarse map has no attractor that can be trusted.
 
-    A trusted one is simple, strongly stable, and reached from enough points. Where the next landing is about as far off
-    as the last, straight pieces between points create long cycles that the stage does not have.
+    A trusted attractor is simple, strongly stable, and reached from enough points. Where the next landing is about as
+    far off as the last, straight pieces between points create long cycles that the stage does not have.
     """
     settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
@@ -231,7 +233,7 @@ def search_alone() -> Iterator[None]:
 
 
 def has_a_map(stages: Ensemble) -> bool:
-    """Tell whether the sticking distance of stages may decide everything that follows.
+    """Tell whether the sticking distance alone may decide how stages go on.
 
     It does not if a joint swings freely while the cart sticks, a limiter chatters, a force limit without anti-windup
     lets swings grow, integrals of several loops wind up separately, or the stage may stand anywhere within a dead band

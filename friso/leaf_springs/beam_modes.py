@@ -29,9 +29,10 @@ bending in its plane, torsion, stretching."""
 class Reduced:
     """A straight leaf reduced to the motion of its stage end and a few modes of its own.
 
-    `static` (nodes, 6, 6) holds its shapes for unit motions of the stage end. `inner` (nodes, 6, modes) holds its modes
-    between held ends at unit modal mass, and `squares` (modes,) their circular frequencies squared [1/s^2]. `stiffness`
-    and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass between both kinds of motion.
+    `static` (nodes, 6, 6) holds the shapes of the leaf for unit motions of the stage end. `inner` (nodes, 6, modes)
+    holds its modes between held ends at unit modal mass, and `squares` (modes,) their circular frequencies squared
+    [1/s^2]. `stiffness` and `mass` (6, 6) are those at the stage end. `coupling` (modes, 6) is the mass that couples
+    both kinds of motion.
     """
 
     static: np.ndarray
@@ -101,7 +102,10 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
-    """Return the lowest modes and all modes of the stage: the drive mode first, then by frequency."""
+    """Return the lowest modes, and all modes of the stage.
+
+    The drive mode comes first, the others by frequency.
+    """
     settings = LeafSpringSettings.current()
     ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
@@ -112,7 +116,7 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     body = body_mass(mechanism)
     mass[stage, stage] = body + _gathered(ends, leaf.mass)
     np.fill_diagonal(stiffness[COORDINATES:, COORDINATES:], np.tile(leaf.squares, len(rows)))
-    # row k of the leaves takes part with the weights rows[k]
+    # pattern k of the leaves acts with the weights rows[k]
     mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
     mass[stage, COORDINATES:] = mass[COORDINATES:, stage].T
     squares, vectors = eigh(stiffness, mass)
@@ -175,7 +179,7 @@ def _rows(offsets: np.ndarray) -> np.ndarray:
 
 
 def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
-    """Return the least load [N] along the leaves, shared by them, at which the stage sways.
+    """Return the least load [N] along all leaves together at which the stage sways.
 
     `straight` is the stiffness of a leaf without load. `load` [N] is a guess, at which the problem is linearised.
     """

@@ -1,12 +1,12 @@
 """Model the leaves of a mechanism as geometrically exact beams of exudyn.
 
-Forces, stiffness and mass of their nodes are computed. Only this module knows exudyn. A leaf is a chain of equal
-two-node elements of constant strain. Three things keep few of them exact. The bending an element misses because its
-moment is taken as constant is added to its shear flexibility (residual bending flexibility: h^2/(12 E I) per force).
-The mass its bent middle carries beyond the straight line between its nodes is added to its rotary inertia (rho A
-h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness
-of the plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf
-adds.
+The module computes forces, stiffness and mass of the nodes. Only this module knows exudyn. A leaf is a chain of equal
+two-node elements of constant strain. Three corrections keep few elements exact. An element misses bending because its
+moment is taken as constant; that bending is added to its shear flexibility (residual bending flexibility: h^2/(12 E I)
+per force). Its bent middle carries mass beyond the straight line between its nodes; that mass is added to its rotary
+inertia (rho A h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the
+stiffness of the plate in parallel motion, under a constant torque, and under the torque that a force across the
+deflected leaf adds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ COORDINATES = 6
 
 
 class BeamFailure(RuntimeError):
-    """A mechanism that the beam model cannot evaluate."""
+    """Error: a mechanism that the beam model cannot evaluate."""
 
 
 class LeafBeams:
@@ -39,9 +39,9 @@ class LeafBeams:
     """
 
     def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
-        """Build one leaf of so many elements in exudyn."""
+        """Build one leaf with the given number of elements in exudyn."""
         self.count, self.nodes = int(mechanism.leaves), elements + 1
-        import exudyn  # of an extra
+        import exudyn  # package of an extra
 
         self._container: Any = exudyn.SystemContainer()
         self._system: Any = self._container.AddSystem()
@@ -55,15 +55,15 @@ class LeafBeams:
         self._solver.InitializeSolver(self._system, settings)
 
     def forces(self, state: np.ndarray) -> np.ndarray:
-        """Forces and moments [N, N m] that hold the nodes in this state."""
+        """Return the forces and moments [N, N m] that hold the nodes in this state."""
         return -np.array([self._forces(leaf) for leaf in state]).reshape(state.shape)
 
     def stiffness(self, state: np.ndarray) -> np.ndarray:
-        """Tangent stiffness of each leaf in this state, shape (leaves, 6 nodes, 6 nodes)."""
+        """Return the tangent stiffness of each leaf in this state, shape (leaves, 6 nodes, 6 nodes)."""
         return np.array([self._stiffness(leaf) for leaf in state])
 
     def mass(self) -> np.ndarray:
-        """Mass of an undeflected leaf, shape (6 nodes, 6 nodes)."""
+        """Return the mass of an undeflected leaf, shape (6 nodes, 6 nodes)."""
         self._move(np.zeros((self.nodes, COORDINATES)))
         self._solver.ComputeMassMatrix(self._system)
         return np.array(self._solver.GetSystemMassMatrix())
@@ -90,7 +90,8 @@ class LeafBeams:
 class Configuration:
     """Displacements of leaves and stage in the plane of motion.
 
-    `inner` holds those of the nodes between the ends (leaves, nodes, 3), `stage` those of the stage (x, z, about y).
+    `inner` holds the displacements of the nodes between the ends (leaves, nodes, 3), `stage` those of the stage (x, z,
+    about y).
     """
 
     inner: np.ndarray
@@ -121,8 +122,9 @@ class Configuration:
 class Condensed:
     """The leaves condensed onto the stage: their inner nodes are eliminated.
 
-    Inner nodes `follow` the stage (leaves, inner coordinates, 3), and `settle` (leaves, inner coordinates) under forces
-    that are out of balance. `force` (3,) and `stiffness` (3, 3) are what remains at the stage.
+    `follow` (leaves, inner coordinates, 3) tells how inner nodes move with the stage, and `settle` (leaves, inner
+    coordinates) how they move under forces that are out of balance. `force` (3,) and `stiffness` (3, 3) are what
+    remains at the stage.
     """
 
     follow: np.ndarray
@@ -181,7 +183,7 @@ def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
 def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     """Return the cross-section of an element of length h [m].
 
-    `curl` and `twist` are its compliance in bending and torsion over that of a plain beam.
+    `curl` and `twist` are the compliances in bending and torsion relative to a plain beam.
     """
     weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
     shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
@@ -223,7 +225,7 @@ def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """Return the compliance in torsion of elements.
 
     It follows `plate.free_twist`, so that a constant torque meets the stiffness of the plate. It is tilted so that the
-    torque of a force across the deflected leaf, s^3, does so too.
+    torque of a force across the deflected leaf, s^3, meets it too.
 
     In an element this torque is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
     (found by comparison; 1/n^2 errors of the stiffness along y vanish).

@@ -1,8 +1,8 @@
 """Model the mechanism as geometrically exact beams (exudyn), nonlinear over the stroke.
 
 The stage is pushed along z. Leaves and stage then move in the x-z plane alone. The stiffness of the deflected mechanism
-has all six coordinates: those in the plane (x, z, about y) and those across it (y, about x, about z) stay independent.
-Nodes between cart and stage are eliminated leaf by leaf.
+has all six coordinates: three in the plane (x, z, about y) and three across it (y, about x, about z), which stay
+independent. Nodes between cart and stage are eliminated leaf by leaf.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.leaf_springs.settings import LeafSpringSettings
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
-"""Coordinates of the stage that move with the stroke, and the others, as slices of six."""
+"""Coordinates of the stage in the plane of motion, and across it, as slices of six."""
 
 
 @dataclass(frozen=True)
 class HeldEquilibrium:
-    """The equilibrium with the stage held at z.
+    """Equilibrium with the stage held at z.
 
     It holds the place and its rate per z, the force along z, and the tangent stiffness (6, 6) of the stage.
     """
@@ -42,11 +42,11 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
     """
     _check(mechanism, stroke)
     try:
-        with np.errstate(all="ignore"):  # what comes out as no number is found by Leaves
+        with np.errstate(all="ignore"):  # Leaves finds results that are no numbers
             return _evaluate(mechanism, float(stroke), LeafBeams(mechanism, elements))
     except BeamFailure:
         raise
-    except (ValueError, ArithmeticError, RuntimeError) as error:  # of numpy, scipy and exudyn
+    except (ValueError, ArithmeticError, RuntimeError) as error:  # errors of numpy, scipy and exudyn
         cause = str(error).strip().splitlines() or [type(error).__name__]
         raise BeamFailure(f"The beams have no unique equilibrium or modes: {cause[0]}") from error
 
@@ -90,7 +90,7 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
 
 
 def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
-    """Return the next equilibrium, reached in as few steps as possible."""
+    """Return the next equilibrium at z, reached in as few steps as possible."""
     settings = LeafSpringSettings.current()
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
@@ -150,7 +150,7 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 
 @dataclass(frozen=True)
 class LinearisedLeaves:
-    """A configuration linearised in the plane.
+    """A configuration linearised in the plane of motion.
 
     It holds the change that leads to equilibrium at the same z, and the energy of that change.
     """
@@ -204,6 +204,6 @@ def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np
     ends[:, 0, 1] = -tilt * offsets
     bend = -tilt * np.sum(offsets * forces[:, -1, 2])
     successive = Condensed.of(stiffness, np.zeros_like(forces), 1, ends, bend=(1, bend)).stiffness
-    # from angles of successive rotations to rotations about the axes at rest
+    # convert angles of successive rotations to rotations about fixed axes
     angles = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -np.tan(turn)], [0.0, 0.0, 1 / tilt]])
     return angles.T @ successive @ angles

@@ -44,7 +44,10 @@ class BothModels:
 
 
 def both_models(stage: Stage, mechanism: Mechanism, stroke: float) -> BothModels:
-    """Evaluate the leaf springs of a stage at a stroke [m]; a failure of the beams is kept."""
+    """Evaluate the leaf springs of a stage at a stroke [m].
+
+    If the beam model fails, the result has the reason.
+    """
     simple = closed_form_model(mechanism, stroke)
     try:
         return BothModels(stage, simple, beams(mechanism, stroke))

@@ -21,16 +21,16 @@ CLAMPED = 4.730040744862704
 """First root of cos x cosh x = 1: a beam between clamps."""
 
 WITH_STAGE, WITH_TURN = 0.41543, 0.08939
-"""Mean over a leaf of its first bending mode, of mean square 1, times the shape that it takes statically when the stage
-moves along the motion, and when it turns about the width (per length of the leaf)."""
+"""Mean over a leaf of its first bending mode, which has mean square 1, times a static shape of the leaf: the shape when
+the stage moves along the motion, and the shape when it turns about the width (per length of the leaf)."""
 
 LATERAL = 9.229
-"""Force across the end of a leaf, over sqrt(E I G J)/L^2, at which the leaf gives way sideways: it twists and bends,
+"""Force across the end of a leaf, over sqrt(E I G J)/L^2, at which the leaf gives way sideways: it twists and bends.
 theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both clamps, the stage free to follow."""
 
 
 def drive_stiffness(mechanism: Mechanism) -> Any:
-    """Return the stiffness along the motion with the stage kept parallel.
+    """Return the stiffness along the motion while the stage stays parallel.
 
     It is n 12 E I/L^3, stiffened as a plate.
     """
@@ -47,12 +47,12 @@ def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
 
 
 def axial(mechanism: Mechanism) -> Any:
-    """Return E A of a leaf [N], as stiff as its clamps make it."""
+    """Return E A of a leaf [N], including the stiffening by its clamps."""
     return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
-    """Return 5/6 G A of a leaf in its plane [N], as stiff as its clamps make it."""
+    """Return 5/6 G A of a leaf in its plane [N], including the stiffening by its clamps."""
     return (
         SHEAR
         * mechanism.shear
@@ -62,7 +62,7 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
 
 
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Return the stiffness along the leaves with all else held.
+    """Return the stiffness along the leaves while all other coordinates are held.
 
     It falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
     """
@@ -72,7 +72,7 @@ def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 
 
 def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Return the stiffness along the width with all else held.
+    """Return the stiffness along the width while all other coordinates are held.
 
     It contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it by 4 delta
     (s/L)^3, with s from its middle, without the warping that its clamps forbid.
@@ -139,7 +139,7 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 def _mode_stiffening(mechanism: Mechanism) -> Any:
     """Return the plate's stiffening for moments that change sign along the leaf, as in a mode.
 
-    It is taken from parallel motion. The even share of the moments lies far from the clamps and has little influence.
+    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence.
     """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
@@ -147,7 +147,7 @@ def _mode_stiffening(mechanism: Mechanism) -> Any:
 def leaf_torsion(mechanism: Mechanism) -> Any:
     """Return the frequency of the first torsional mode of a leaf between its clamps.
 
-    It is Rayleigh's quotient of the twist that an even torque along the leaf makes.
+    It is Rayleigh's quotient of the twist under a constant torque along the leaf.
     """
     rate = plate.warping_rate(mechanism.width, mechanism.poisson)
     nodes, weights = np.polynomial.legendre.leggauss(24)

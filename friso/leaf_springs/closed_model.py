@@ -42,7 +42,7 @@ def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
 def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
     """Return the modes of stage and leaves by closed forms.
 
-    The leaves bend in phase with the stage, or move with the stage at rest.
+    The leaves bend in phase with the stage, or move while the stage is at rest.
     """
     frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
@@ -88,12 +88,12 @@ def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
 
 
 def _unlike(mechanism: Mechanism) -> list[Mode]:
-    """Return the first bending mode of the leaves against each other, with the stage at rest."""
+    """Return the modes in which the leaves bend against each other, with the stage at rest."""
     settings = LeafSpringSettings.current()
     count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
     modes = []
     for k in range(1, count):
-        wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # orthogonal patterns
+        wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # patterns of the leaves, orthogonal to each other
         leaves = np.zeros((count, settings.mode_shape_points, 3))
         leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(leaf_mass * np.sum(wave**2))
         frequency = float(closed_forms.leaf_bending(mechanism))

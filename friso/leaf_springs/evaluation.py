@@ -1,4 +1,4 @@
-"""Collect the results on a mechanism at a stroke, by any model."""
+"""Collect the results for a mechanism at a stroke, by any model."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class Mode:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A mechanism at deflections of its stage along the motion.
+    """Results for a mechanism at deflections of its stage along the motion.
 
     `deflections` [m] run from 0 to the stroke, shape (n,). `forces` [N] hold the stage there. `drive` is the stiffness
     along the motion [N/m], with the stage otherwise free to shift and turn. `support_x` along the leaves and
-    `support_y` along their width [N/m] hold with all else fixed. All have shape (n,).
+    `support_y` along their width [N/m] are stiffnesses with all other coordinates fixed. All have shape (n,).
 
-    `stiffness` (2, 6, 6) is that of the stage at its reference point, the middle of the leaf ends, at deflection 0 and
+    `stiffness` (2, 6, 6) belongs to the stage at its reference point, the middle of the leaf ends, at deflection 0 and
     at full stroke. It relates forces [N] and moments [N m] along and about x, y, z to displacements [m] and rotations.
-    `modes` are those at deflection 0, the drive mode first, then by frequency.
+    `modes` are the modes at deflection 0, the drive mode first, then by frequency.
 
     At full stroke, `stress` is the largest bending stress [Pa] without the concentration at the clamp, and `shortening`
     how much the leaves shorten [m]. `buckling` is the load [N] along all leaves together at which the stage sways.
@@ -117,7 +117,10 @@ class Evaluation:
         return next((mode for mode in self.modes if self.interferes(mode)), None)
 
     def interferes(self, mode: Mode) -> bool:
-        """Tell whether a mode disturbs control; the drive mode, on which control works, never does."""
+        """Tell whether a mode disturbs control.
+
+        The drive mode, on which control works, never does.
+        """
         return mode.interferes and mode is not self.modes[0]
 
     @property
@@ -134,8 +137,8 @@ class Evaluation:
 def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
     """Return how far a mode's resonance rises above the line of the stage's mass.
 
-    It follows from the mode's motion [1/sqrt(kg)] at actuator and sensor. The residue is phi_a phi_s against 1/m of the
-    mass, and the resonance divides by 2 zeta.
+    It follows from the mode's motion [1/sqrt(kg)] at actuator and sensor: the residue phi_a phi_s over 1/m of the mass,
+    divided by 2 zeta.
     """
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 

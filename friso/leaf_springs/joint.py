@@ -17,11 +17,11 @@ from friso.stage.flexure import register_derivation
 
 @register_derivation("flexure")
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `joint.stiffness` and the keys of [parasitic] for given leaves, by closed forms.
+    """Return `joint.stiffness` and the keys of [parasitic] for given leaf springs, by closed forms.
 
     Raises InputError if a single mechanism buckles under its load.
     """
-    with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
+    with np.errstate(all="ignore"):  # the rules of the stage file find numbers that make no mechanism
         mechanism = Mechanism.of(flat)
         frequency, share = parasitic_mode(mechanism)
         stiffness, buckling = closed_forms.loaded_drive_stiffness(mechanism), closed_forms.buckling_load(mechanism)
@@ -41,10 +41,10 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class VisibleModes:
-    """The modes of mechanisms other than the drive mode, arrays of shape (..., 7).
+    """Modes of mechanisms other than the drive mode, arrays of shape (..., 7).
 
-    They hold frequency [Hz], and residue times the mass of the stage. A residue is positive where actuator and sensor
-    move in phase. Entries at the drive mode are 0.
+    They hold the frequency [Hz], and the residue times the mass of the stage. A residue is positive where actuator and
+    sensor move in phase. Entries at the drive mode are 0.
     """
 
     frequency: np.ndarray
@@ -90,10 +90,10 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     """Return frequency [Hz] and residue of the mode whose resonance stands highest in the plant.
 
     Residues are multiplied by the stage's mass. The mode has the largest residue over the square of its frequency. If
-    none is visible, the leaves' own mode is returned without weight.
+    no mode is visible, the leaves' own mode is returned without weight.
 
-    In the equations, a part m_p of the stage's mass m moves on a spring, with the residue m_p/(m (m - m_p)). That is
-    never negative. If actuator and sensor move against each other, only the size of the residue counts.
+    In the equations, a part m_p of the stage's mass m moves on a spring, which gives the residue m_p/(m (m - m_p)). It
+    is never negative. If actuator and sensor move against each other, only the size of the residue counts.
     """
     settings = LeafSpringSettings.current()
     visible = VisibleModes.of(mechanism)

@@ -1,4 +1,4 @@
-"""A parallel leaf-spring mechanism as data (thesis, Fig. 6).
+"""Represent a parallel leaf-spring mechanism as data (thesis, Fig. 6).
 
 x runs along the leaves, from the cart (0) to the stage (L), y along their width, z through their thickness, which is
 the direction of motion. The origin lies between the clamps at the cart, in the middle of the width and of the row of
@@ -39,10 +39,10 @@ class MovingBody:
 class Mechanism:
     """Leaves in a row, neighbours `spacing` apart, all of `length`, `width` and `thickness` [m].
 
-    `young` [Pa], `poisson`, `density` [kg/m^3], `yield_strength` and `fatigue` [Pa] (NaN where it is not known) are of
-    their material. `actuation` and `sensor` are the points [m] where the actuator pushes along z and where the position
-    along z is measured. `damping_ratio` is that of its own modes, `stress_concentration` a factor on the stress at the
-    clamps. The `load` [N] presses along the leaves, on all of them together.
+    `young` [Pa], `poisson`, `density` [kg/m^3], `yield_strength` and `fatigue` [Pa] (NaN if unknown) describe their
+    material. `actuation` and `sensor` are the points [m] where the actuator pushes along z and where the position along
+    z is measured. `damping_ratio` is that of the mechanism's own modes, `stress_concentration` a factor on the stress
+    at the clamps. The `load` [N] presses along the leaves, on all of them together.
     """
 
     leaves: Any

@@ -27,7 +27,7 @@ def mode_name(
     [m] (3,) away from the reference point.
 
     `leaves` (leaves, points, 3) are displacements of the middle lines at even places from cart to stage. `leaf_mass`
-    [kg] is the mass of one leaf. Energy that is found nowhere else is torsion of the leaves.
+    [kg] is the mass of one leaf. The remaining energy counts as torsion of the leaves.
     """
     speed = stage[:3] + np.cross(stage[3:], arm)
     energies = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
@@ -43,7 +43,7 @@ def mode_name(
         return STAGE[3 + int(np.argmax(energies[3:5]))]
     if name == "leaf bending":
         ripples = _dynamic_part(leaves[:, :, 2])
-        # the part that all leaves have in common
+        # fraction that is common to all leaves
         alike = len(leaves) * np.sum(np.mean(ripples, axis=0) ** 2) / np.sum(ripples**2)
         return f"leaf bending, {'in' if alike > 0.5 else 'out of'} phase{_number(ripples)}"
     if name == "leaf in-plane bending":
@@ -59,14 +59,14 @@ def _mean(values: np.ndarray) -> np.ndarray:
 def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
     """Return the shapes (leaves, points) without their static part.
 
-    The static part is what follows a shift of the stage.
+    The static part is the shape of leaves that follow a shift of the stage.
     """
     x = np.linspace(0, 1, shapes.shape[1])
     return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))
 
 
 def _number(shapes: np.ndarray) -> str:
-    """Return what is added to the name of a shape with two waves or more.
+    """Return the number of waves as an addition to the name of a shape, from two waves on.
 
     Waves are counted on the leaf that moves most.
     """

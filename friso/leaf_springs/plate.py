@@ -20,9 +20,9 @@ import numpy as np
 from friso.leaf_springs.settings import LeafSpringSettings
 
 CONVERGED, PEAK = 0.878, 0.63
-"""Share of the stiffening that remains with more functions across the width (0.866 to 0.895 at a Poisson's ratio of
-0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess of the stress (0.60, for square leaves 0.65), of leaves from
-1 to 6 times as long as wide (tests/ritz.py)."""
+"""Fractions that remain with more functions across the width: of the stiffening (0.866 to 0.895 at a Poisson's ratio of
+0.3, 0.854 to 0.909 from 0.05 to 0.45), and of the excess stress (0.60, for square leaves 0.65). They hold for leaves
+from 1 to 6 times as long as wide (tests/ritz.py)."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
     factor = stiffening(length, width, poisson)
-    return 1 - stiff * (CONVERGED + factor - 1) / factor  # the share of `stiff` that more functions leave
+    return 1 - stiff * (CONVERGED + factor - 1) / factor  # fraction of `stiff` that remains with more functions
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:
@@ -160,7 +160,7 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
-    """Change compliances in torsion along a leaf (n,) by exp(tilt place^2).
+    """Multiply compliances in torsion along a leaf (n,) by exp(tilt place^2).
 
     Their sum stays, so that an even torque twists the leaf as before. Their sum weighted by the square of the `torques`
     (n,) becomes `weighted_sum`.
@@ -183,10 +183,10 @@ def free_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def stretching(length: Any, width: Any, poisson: Any) -> Any:
-    """Return by what factor a leaf is stiffer along its length than a rod.
+    """Return the factor by which a leaf is stiffer along its length than a rod.
 
-    Its clamps forbid it to grow narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6 times the width
-    in length, with Poisson's ratios from 0 to 0.45.
+    Its clamps keep it from growing narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6 times the
+    width in length, with Poisson's ratios from 0 to 0.45.
     """
     return 1 / (1 - 0.28 * poisson**2 * width / length)
 

@@ -21,14 +21,14 @@ class LeafSpringSettings(Settings):
     """Deflections at which beams are evaluated. Fewer miss the curvature of the stiffness over the stroke."""
 
     step_newton_iterations: int = setting(8, "")
-    """Newton iterations of a step. One that needs more converges sooner when halved."""
+    """Newton iterations of a step. A step that needs more converges sooner when halved."""
 
     most_step_halvings: int = setting(5, "")
     """Halvings of a step. Leaves that still do not converge are buckled or folded."""
 
     newton_energy_share: float = setting(1e-7, "")
-    """Newton's error in energy, relative to the total. It leaves an axial force in error by 4e-4 of the buckling load.
-    """
+    """Newton's error in energy, relative to the total. It leaves an error of 4e-4 of the buckling load in the axial
+    force."""
 
     folding_angle: float = setting(1.3, "rad")
     """Angle beyond which the mechanism is folded rather than deflected."""
@@ -52,4 +52,4 @@ class LeafSpringSettings(Settings):
     """Displacement over the largest one below which rounding decides the sign of a shape."""
 
     tilt_iterations: int = setting(8, "")
-    """Iterations of the tilt. Four are enough for rounding."""
+    """Iterations of the tilt. Four reach rounding."""

@@ -1,1 +1,1 @@
-"""Files, signals, processes and installed packages, whatever the operating system."""
+"""Handle files, signals, processes and installed packages alike on all operating systems."""

@@ -12,7 +12,7 @@ _READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 
 
 
 class LargeFileError(OSError):
-    """A file of `size` [bytes] exceeds the allowed size."""
+    """Error: a file of `size` [bytes] exceeds the allowed size."""
 
     def __init__(self, size: int) -> None:
         super().__init__(f"a file of {size / 1e6:.3g} MB")

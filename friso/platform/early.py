@@ -1,7 +1,7 @@
 """Prepare the command line before the rest of friso is imported, with hardly any imports of its own.
 
 A signal during the import is remembered. No module is loaded from the current folder, which may belong to someone else.
-Nothing happens where friso is used as a library.
+The module has no effect if friso is used as a library.
 """
 
 import os
@@ -10,7 +10,7 @@ import sys
 
 def _module() -> str:
     """Return the module that Python was started with by -m; "" without one."""
-    if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
+    if sys.argv[:1] != ["-m"]:  # its value until the module itself runs
         return ""
     for word, following in zip(sys.orig_argv[1:], [*sys.orig_argv[2:], ""], strict=True):
         flags, option, name = word.partition("m")
@@ -21,8 +21,8 @@ def _module() -> str:
 
 _IS_MODULE = _module() in ("friso", "friso.__main__")
 _HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m puts it there, but for -P
-    del sys.path[0]  # before anything is imported that Python has not had until now
+if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m adds it, unless started with -P
+    del sys.path[0]  # before any import of a module that Python has not loaded yet
 
 import atexit  # noqa: E402
 import signal  # noqa: E402
@@ -45,7 +45,7 @@ def _note(number: int, frame: FrameType | None) -> None:
 def _ignore() -> None:
     """Ignore signals from now on, at the end of a command.
 
-    Python removes its handlers as it exits, and a signal after that would kill a command that has finished.
+    Python removes its handlers as it exits, and a later signal would kill a command that has finished.
     """
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
@@ -53,6 +53,6 @@ def _ignore() -> None:
 
 if IS_COMMAND:
     for number in SIGNALS:
-        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup
+        if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, _note)
-    atexit.register(_ignore)  # among the first, and so among the last that are called
+    atexit.register(_ignore)  # registered early, and therefore called late

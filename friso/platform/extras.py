@@ -1,4 +1,4 @@
-"""Optional dependencies ("extras") that a few commands need, and how to install them."""
+"""List optional dependencies ("extras") that a few commands need, and say how to install them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from friso.errors import InputError
 
 EXTRAS = {"cluster": ("dask", "distributed"), "design": ("exudyn", "pymoo")}
 """Packages of each extra that commands need, by the extra's name in pyproject.toml.
-
-For packages of log formats, see `friso.identification.logs.libraries`."""
+`friso.identification.logs.libraries` lists packages of log formats."""
 
 
 def install(extra: str) -> str:
@@ -21,7 +20,7 @@ def is_installed(package: str) -> bool:
     """Tell whether a package is installed, without importing it."""
     try:
         return find_spec(package) is not None
-    except ValueError:  # a module of that name that was made by hand
+    except ValueError:  # a module of that name made by hand
         return False
 
 
@@ -33,7 +32,7 @@ def missing(extra: str) -> list[str]:
 def need(extra: str, subject: str) -> None:
     """Check that an extra is installed, before anything is computed.
 
-    Raises InputError if not. The message names the `subject`, a command or an option, and says how to install the
+    Raises InputError if it is not. The message names the `subject`, a command or an option, and says how to install the
     extra.
     """
     if packages := missing(extra):

@@ -1,4 +1,4 @@
-"""Python processes that answer questions of this one, one at a time.
+"""Run Python processes that answer questions of this one, one at a time.
 
 A process ends by itself if no question comes for a while, or when its parent ends.
 """
@@ -18,7 +18,7 @@ from threading import Thread, Timer
 from typing import Any
 
 PATIENCE = 60.0
-"""Time [s] to wait for the next question: a waiting process may hold 150 MB."""
+"""Time [s] to wait for the next question. Longer waits keep 150 MB per process."""
 
 
 class HelperProcess:
@@ -30,7 +30,7 @@ class HelperProcess:
         command = [sys.executable, "-P", "-m", module, *arguments]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
-        Thread(target=self._process.wait, daemon=True).start()  # one that has ended does not stay as a zombie
+        Thread(target=self._process.wait, daemon=True).start()  # so that a process that has ended is no zombie
 
     def ask(self, question: object) -> Any:
         """Ask the process a question, and return its answer.
@@ -39,12 +39,12 @@ class HelperProcess:
         """
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        with suppress(OSError):  # nobody reads it any more: the process ended, and says why
+        with suppress(OSError):  # the process has ended, and says why
             pickle.dump(question, self._process.stdin)
             self._process.stdin.flush()
         try:
             return pickle.load(self._process.stdout)
-        except pickle.UnpicklingError as error:  # it ended on the way
+        except pickle.UnpicklingError as error:  # it ended while answering
             raise EOFError(str(error)) from None
 
     def end(self) -> str:
@@ -68,8 +68,8 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
     """
     if not orphaned:
         Thread(target=_end_with, args=[os.getppid()], daemon=True).start()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
-    answers, sys.stdout = sys.stdout, sys.stderr  # what plug-ins print is no answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C on a terminal: the parent ends this process
+    answers, sys.stdout = sys.stdout, sys.stderr  # output of plug-ins must not mix with answers
     while True:
         patience = Timer(PATIENCE, os._exit, (0,))
         patience.daemon = True
@@ -84,9 +84,9 @@ def answer_questions(answer: Callable[[Any], Any], orphaned: bool = True) -> Non
 
 
 def _end_with(parent: int) -> None:
-    """End this process as soon as its parent has ended; look twice a second.
+    """End this process as soon as its parent has ended; check twice a second.
 
-    Windows does not report a new parent, so that it has no effect there.
+    It has no effect on Windows, which does not report a new parent.
     """
     while os.getppid() == parent:
         time.sleep(0.5)

@@ -40,8 +40,8 @@ def installed_modules(group: str, taken: frozenset[str] = frozenset()) -> Mappin
 
 @cache
 def _entry_points() -> Mapping[str, list[tuple[str, str]]]:
-    """Return names and modules of all entry points that are about friso, by group."""
-    from importlib.metadata import entry_points  # costs as much as all of friso's stage file
+    """Return names and modules of all entry points for friso, by group."""
+    from importlib.metadata import entry_points  # takes as long as all of friso's stage file
 
     points = entry_points()
     groups = [group for group in points.groups if group.startswith("friso.")]
@@ -60,7 +60,7 @@ def load_module(group: str, name: str, module: str) -> ModuleType:
     Raises InputError if it cannot be imported.
     """
     try:
-        with redirect_stdout(sys.stderr):  # what a plug-in prints is no answer
+        with redirect_stdout(sys.stderr):  # output of plug-ins must not mix with answers
             return import_module(module)
     except InputError as error:
         raise error.under(f"{group}: {name}") from None

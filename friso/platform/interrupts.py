@@ -1,9 +1,8 @@
-"""End the command line in one line on Ctrl-C, a termination or a closed terminal,
-whenever they come.
+"""End the command line with one line on Ctrl-C, a termination or a closed terminal, at any time.
 
 Importing friso and its libraries takes up to a second. An exception in this time is lost, or ends in a traceback from a
 half-loaded library. So a signal raises KeyboardInterrupt only while no import is under way. Before the command begins,
-it is noted (`friso.platform.early`). If the command does not end in time, the process is ended.
+`friso.platform.early` notes the signal. If the command does not end in time, the process is ended.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from friso.platform.early import SIGNALS
 from friso.platform.system import interrupts_held, no_signal_later, signal_later, signals_told
 
 _AGAIN = 0.02
-"""After how long [s] it is looked again whether an import has ended."""
+"""Interval [s] between checks for the end of an import."""
 
 PATIENCE = 10.0
 """Time [s] that a command may take to end after a signal."""
@@ -32,13 +31,13 @@ PATIENCE = 10.0
 _raising = _said = False
 _bounded = True
 _waits = False
-"""True if a signal came during an import, after which it is raised."""
+"""True if a signal came during an import; it is raised after the import."""
 
 _held = 0
-"""Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
+"""Number of nested blocks of `hold_interrupts`, in which signals wait."""
 
 _whole = threading.RLock()
-"""Held in these blocks."""
+"""Lock that is held in blocks of `hold_interrupts`."""
 
 
 def came() -> int:
@@ -47,14 +46,14 @@ def came() -> int:
 
 
 def last_word(number: int) -> str:
-    """Return how a command says what ended it, its last line."""
+    """Return the last line of a command, which says what ended it."""
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"
 
 
 def answers_interrupts() -> None:
-    """Let this command end in its own time: it answers Ctrl-C with what it has so far."""
+    """Let this command end in its own time: it answers Ctrl-C with its results so far."""
     global _bounded
     _bounded = False
 
@@ -82,7 +81,7 @@ def raising() -> Iterator[None]:
     finally:
         _raising = _waits = False
         no_signal_later()
-        if not early.IS_COMMAND:  # which ends now, and is not to be interrupted in that
+        if not early.IS_COMMAND:  # the command is ending, and must not be interrupted
             sys.unraisablehook = ignored
             early.came.clear()
             for number, handler in before.items():
@@ -90,7 +89,7 @@ def raising() -> Iterator[None]:
 
 
 def raise_what_waits() -> None:
-    """Raise the KeyboardInterrupt of a signal that came during an import.
+    """Raise KeyboardInterrupt for a signal that came during an import.
 
     It is called before work that must not be cut short, because a later signal would have to wait for its end.
     """
@@ -102,7 +101,7 @@ def raise_what_waits() -> None:
 def hold_interrupts() -> Iterator[None]:
     """Make Ctrl-C and a termination wait for the end of the block.
 
-    Outside the main thread, which signals do not reach, nothing is done.
+    Outside the main thread, which signals do not reach, it has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -123,7 +122,7 @@ def hold_interrupts() -> Iterator[None]:
 
 
 def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:
-    """Handle the signals by `handler`, except ignored ones (nohup); return former handlers."""
+    """Handle the signals by `handler`, except ignored ones (nohup); return the former handlers."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
     taken = {number: earlier for number, earlier in before.items() if earlier is not signal.SIG_IGN}
     for number in taken:
@@ -138,7 +137,7 @@ def _arrived(number: int, frame: FrameType | None) -> None:
     if not _raising:
         return
     _waits = _imports(frame) or bool(_held)
-    if _waits:  # it comes again
+    if _waits:  # the signal is sent again
         signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt
@@ -147,9 +146,9 @@ def _arrived(number: int, frame: FrameType | None) -> None:
 def _end_in_time(pipe: int) -> None:
     """End the process some time after a signal, whatever its main thread is doing.
 
-    It may be in an import that does not return, or in a library that keeps the interpreter for minutes or swallows the
-    exception. Files that are being put in place are completed first. `pipe` is the descriptor from which signals can
-    be read, a byte each, even while the main thread hears none.
+    The main thread may be in an import that does not return, or in a library that keeps the interpreter for minutes or
+    swallows the exception. Files that are being put in place are completed first. `pipe` is the descriptor from which
+    signals can be read, a byte each, even while the main thread receives none.
     """
     number = came()
     while number not in SIGNALS:
@@ -159,9 +158,9 @@ def _end_in_time(pipe: int) -> None:
         time.sleep(PATIENCE)
     if not _bounded:
         return
-    threading.Timer(1.0, os._exit, (128 + number,)).start()  # a pipe that nobody reads takes no last word
+    threading.Timer(1.0, os._exit, (128 + number,)).start()  # a pipe without a reader takes no last word
     if not _said:
-        with suppress(OSError):  # nor does a terminal that is closed
+        with suppress(OSError):  # nor does a closed terminal
             os.write(2, f"friso: {last_word(number)}\n".encode())
     os._exit(128 + number)
 
@@ -169,7 +168,7 @@ def _end_in_time(pipe: int) -> None:
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
     """Raise a KeyboardInterrupt again that Python would lose in a finalizer or a callback.
 
-    Python ignores what is raised there and prints a traceback. What an interrupt cut short is not reported.
+    Python ignores exceptions there and prints a traceback. The work that an interrupt cuts short is not reported.
     """
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
         signal_later(_AGAIN, _arrived)

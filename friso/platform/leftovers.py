@@ -1,5 +1,7 @@
-"""Folders that a process keeps locked, by a file in them, for as long as it uses them: one whose process was killed is
-a leftover."""
+"""Manage folders that a process keeps locked, by a file in them, for as long as it uses them.
+
+The folder of a process that was killed is a leftover.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,9 @@ _TRIES = 3
 
 @contextmanager
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
-    """Return a new, locked folder that only this user may open; it is removed in the end.
+    """Make a new, locked folder that only this user may open; remove it in the end.
 
-    While it is locked it is no leftover. Leftovers of killed processes are removed first. Raises OSError.
+    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError.
     """
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
@@ -42,17 +44,18 @@ def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
     """Return a new folder and its lock.
 
-    Before the lock is held another process may remove the folder, and filelock makes it again, readable for others:
-    then another folder is tried.
+    Before the lock is held, another process may remove the folder, and filelock makes it again, readable for others.
+    Then another folder is tried.
     """
     folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
-    folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
+    folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever if Windows allows no folder (python/cpython#66305)
     held = FileLock(folder / lock)
     try:
         made = folder.lstat()
         held.acquire()
         now = folder.lstat()
-        if (now.st_mode, now.st_uid) != (made.st_mode, made.st_uid):  # inodes are used again, or change on a network
+        # an inode may be used again, or change on a network
+        if (now.st_mode, now.st_uid) != (made.st_mode, made.st_uid):
             raise FileNotFoundError(errno.ENOENT, "another process removed it", str(folder))
         return folder, held
     except BaseException as error:
@@ -64,17 +67,20 @@ def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Pa
 
 
 def is_leftover(folder: Path, lock: str) -> bool:
-    """Tell whether nobody holds the file called `lock` in a folder, which is no link to one."""
+    """Tell whether nobody holds the file `lock` in a folder.
+
+    The folder must not be a link.
+    """
     with _unless_locked(folder, lock) as free:
         return free
 
 
 def remove_leftover(folder: Path, lock: str) -> None:
-    """Remove a folder with all that is in it, as far as this user may, if it is a leftover."""
+    """Remove a folder with all its content, as far as this user may, if it is a leftover."""
     with _unless_locked(folder, lock) as free:
         if free:
             shutil.rmtree(folder, ignore_errors=True)
-    if free and not MOVES_OPEN_FOLDERS:  # where a file that is open stays, such as the lock
+    if free and not MOVES_OPEN_FOLDERS:  # an open file, such as the lock, keeps its folder
         with suppress(OSError):
             (folder / lock).unlink(missing_ok=True)
             folder.rmdir()

@@ -1,4 +1,4 @@
-"""Check paths before use: find what no operating system accepts as a path."""
+"""Check paths before use: find names that no operating system accepts."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 
 def unwritable(path: Path) -> tuple[str, str] | None:
-    """Return why nothing can be written to a path, and what can; None if it may be.
+    """Return why nothing can be written to a path, and what can be; None if it may be written.
 
-    Paths may have no name, one that is too long, or one that Windows does not take.
+    The path may have no name, a name that is too long, or one that Windows does not accept.
     """
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"

@@ -27,14 +27,14 @@ Virus scanners and indexers open every new file."""
 
 
 def _quoted(word: str) -> str:
-    """Return a word of a command in quotes; of KEY=VALUE, only the value is quoted."""
+    """Quote a word of a command; in KEY=VALUE, only the value is quoted."""
     return re.sub(r"([\w.]+=)?(.*)", r'\1"\2"', word, count=1, flags=re.DOTALL)
 
 
 def path_of(error: OSError) -> str:
     """Return the path at which an error arose, "" for none.
 
-    Of two paths, it is the one to be written.
+    If there are two paths, it is the one to be written.
     """
     return next(iter(_paths_of(error)), "")
 
@@ -104,7 +104,7 @@ if sys.platform == "win32":
         if not os.access(path, os.W_OK):
             raise OSError(errno.EROFS, "it is read-only", str(path))
         with suppress(FileExistsError):
-            once_free(partial(path.rename, path))  # which changes nothing, but takes the same rights
+            once_free(partial(path.rename, path))  # has no effect, but needs the same rights
 
     def name_new_file(draft: Path, path: Path) -> None:
         """Rename a draft to a path where nothing exists. Raises OSError, FileExistsError if something does."""
@@ -116,7 +116,7 @@ if sys.platform == "win32":
         Raises OSError, also if anything but an empty folder is in the way.
         """
         with suppress(OSError):
-            path.rmdir()  # which elsewhere a renamed folder replaces
+            path.rmdir()  # other systems replace an empty folder by renaming
         once_free(partial(folder.rename, path))
 
     def name_refused(path: Path) -> str:
@@ -299,11 +299,11 @@ def once_free(use: Callable[[], _T]) -> _T:
 
 
 def open_file(path: Path, flags: int) -> int:
-    """Return the descriptor of a file, opened once no other program holds it.
+    """Open a file once no other program holds it, and return its descriptor.
 
     Raises OSError, for a folder too.
     """
-    if path.is_dir():  # which Windows calls one that may not be read
+    if path.is_dir():  # Windows reports a folder as a file that may not be read
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return once_free(partial(os.open, path, flags))
 
@@ -334,7 +334,7 @@ if sys.platform == "linux":
         """
         return max(1, math.ceil(min(len(os.sched_getaffinity(0)), _share_of_time())))
 
-    @cache  # reading it takes half a millisecond, and many short batches ask for it
+    @cache  # reading takes half a millisecond, and many short batches need it
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
         """Return the quota of processor time of this process's control groups, in cores.
 
@@ -344,7 +344,7 @@ if sys.platform == "linux":
             lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]
         except OSError:
             return math.inf
-        tops = {"": root, "cpu": root / "cpu"}  # of version 2, and of version 1, with a folder for every controller
+        tops = {"": root, "cpu": root / "cpu"}  # cgroup version 2, and version 1 with a folder for each controller
         groups = [tops[name] / path.strip("/") for _, names, path in lines for name in names.split(",") if name in tops]
         return min((_quota(above) for group in groups for above in (group, *group.parents)), default=math.inf)
 
@@ -371,12 +371,12 @@ MOVES_OPEN_FOLDERS = sys.platform != "win32"
 """True if a folder with an open file can be renamed or deleted: not on Windows."""
 
 DRAFT_MODE = 0o700 if sys.platform != "win32" else 0o777
-"""Mode of a folder in which files are made that are then moved elsewhere: on Windows 0o700 would give them an access
-list that keeps everybody else out, wherever they are (python/cpython#118486)."""
+"""Mode of a folder for files that are made there and then moved elsewhere. On Windows 0o700 would give the files an
+access list that keeps everybody else out, wherever they are (python/cpython#118486)."""
 
 HAS_JIT_LINK = sys.platform != "win32"
-"""True if llvmlite has LLVM's linker that places code and its constants close to each other (JITLink): not on Windows.
-The older one aborts a large process where they lie too far apart (numba/numba#8567, #9001)."""
+"""True if llvmlite has LLVM's linker that places code and its constants close to each other (JITLink); not on Windows.
+The older linker aborts a large process if they lie too far apart (numba/numba#8567, #9001)."""
 
 MOST_PROCESSES = 61 if sys.platform == "win32" else 10_000
 """Largest number of processes to wait for at one time."""
@@ -386,7 +386,7 @@ LIBRARIES = (
     if sys.platform == "win32"
     else "install friso anew in a new environment"
 )
-"""Advice where a compiled library, such as llvmlite's, cannot be loaded."""
+"""Advice if a compiled library, such as llvmlite's, cannot be loaded."""
 
 LIMITS_MEMORY = sys.platform == "linux"
 """True if the memory of a process can be limited.

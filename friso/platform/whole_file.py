@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Write files completely or not at all."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ FOR_ALL, FOR_USER = 0o666, 0o600
 def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = False) -> Iterator[BinaryIO]:
     """Return a stream whose content replaces a file when the block ends.
 
-    If the block fails nothing is left. A new file is readable for whom the user lets read files, or with `FOR_USER`
-    for this user alone; the permissions of a replaced file may be `kept`. Raises OSError, and FileExistsError if it
-    has to be `new` and something is there by then.
+    If the block fails, nothing is left. A new file is readable for everyone whom the user's settings allow, or with
+    `FOR_USER` for this user alone; the permissions of a replaced file may be `kept`. Raises OSError, and
+    FileExistsError if the file has to be `new` and something is there by then.
     """
     draft = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
@@ -39,7 +39,7 @@ def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = 
             os.fsync(stream.fileno())
         (name_new_file if new else replace_file)(draft, path)
     except BaseException:
-        with suppress(OSError):  # what was raised is told
+        with suppress(OSError):  # the first error is the one to report
             delete_file(draft)
         raise
 

@@ -1,4 +1,7 @@
-"""Find what stops a stage from hunting: settings and isolators, each optimised, then verified by limit cycles."""
+"""Find what stops a stage from hunting.
+
+Controller settings and isolators are each optimised, then verified by limit cycles.
+"""
 
 from typing import Literal
 

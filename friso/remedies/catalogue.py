@@ -34,7 +34,7 @@ class Remedy:
     """A remedy: its `name`, the stage from which it starts, and the variables that it changes, in order.
 
     `buys_joint` tells that it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
-    joint this one builds from leaf springs.
+    joint this remedy builds from leaf springs.
     """
 
     name: str
@@ -44,9 +44,9 @@ class Remedy:
     makes: str = ""
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
-        """Return the keys that change at points (points, variables), coordinates from 0 to 1 over the ranges.
+        """Return the keys that change at points (points, variables), with coordinates from 0 to 1.
 
-        Each key has an array of shape (points,).
+        Coordinates span the range of each variable. Each key has an array of shape (points,).
         """
         flat, changed = self.stage.flat(), dict[str, Any]()
         for variable, share in zip(self.variables, shares.T, strict=True):
@@ -81,7 +81,7 @@ class Remedy:
     def tuned(self, shares: np.ndarray) -> Stage:
         """Return the stage at one point, (variables,), with coordinates from 0 to 1.
 
-        Numbers are rounded to four digits, unless they are the present ones.
+        Numbers are rounded to four digits; unchanged numbers are kept exactly.
         """
         numbers = {key: float(values[0]) for key, values in self.changes(shares[None]).items()}
         present = {variable.name: variable.present for variable in self.variables}
@@ -107,13 +107,13 @@ def with_bandwidth(remedy: Remedy) -> Remedy:
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
-    """Return the remedy that varies all gains, if there are more than the bandwidth sets."""
+    """Return the remedy that varies all gains, if the controller has more gains than its bandwidth."""
     several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
 def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return a notch at the parasitic mode, if margins need it to reach the goal's bandwidth."""
+    """Yield a notch at the parasitic mode, if margins need it to reach the goal's bandwidth."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return
@@ -127,7 +127,7 @@ def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     }
     try:
         with_notch = stage.replace({FILTERS_KEY: [*filters, notch]})
-    except InputError:  # as many filters as there may be
+    except InputError:  # the file has as many filters as are allowed
         return
     key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
     width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
@@ -144,15 +144,15 @@ def _reaches(stage: Stage, goal: Goal) -> bool:
 
 
 def _structures(stage: Stage) -> Iterator[Remedy]:
-    """Return the other structures of the stage's controller, each with all its gains."""
+    """Yield remedies with the other structures of the stage's controller, each varying all its gains."""
     flat = stage.flat()
-    stands = not pieces(flat, 1)[..., 2:].any()  # the reference jumps, or the stage is released
+    stands = not pieces(flat, 1)[..., 2:].any()  # a jump of the reference, or a release
     for name, changes in controller_of(flat).structures(flat).items():
         if stands and all(key.endswith("_feedforward") for key in changes):
             continue
         try:
             other = _restructured(stage, changes)
-        except InputError:  # an uncertain key, for instance, that the other one has not
+        except InputError:  # for instance an uncertain key that the other structure lacks
             continue
         yield from _gains(name, other)
 
@@ -169,7 +169,7 @@ def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return each setting against friction that the stage does not use yet, one at a time."""
+    """Yield each setting against friction that the stage does not use yet, as a remedy of its own."""
     flat = stage.flat()
     if breakaway(flat) <= 0:
         return
@@ -183,7 +183,7 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Return an isolator, without and with changed gains.
+    """Yield an isolator as a remedy, with the present gains and with changed ones.
 
     Leaf springs of the stage file are replaced by a joint with plain numbers.
     """

@@ -47,7 +47,7 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
     """Return the size of a change of a number, as the logarithm of a factor.
 
-    Upward and downward changes count alike. The result is 0 without a previous number.
+    Upward and downward changes count alike. The result is 0 if there was no number before.
     """
     before, after = old.get(key), new.get(key)
     if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:

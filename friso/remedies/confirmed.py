@@ -1,4 +1,4 @@
-"""Confirm that a tuned stage does not hunt at its own bandwidth, nor at bandwidths near it."""
+"""Confirm that a tuned stage does not hunt at its own bandwidth, nor at nearby ones."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Confirmation:
-    """Search for hunting of a stage at its own bandwidth and at those near it.
+    """Result of searching for hunting at a stage's own bandwidth and at nearby ones.
 
-    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does, and `word` the
-    verdict on its own motion from fewer starts; None if that takes too much work. `quiet` tells at which of the
+    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does, and `word` is
+    the verdict on its own motion from fewer starts; None if that takes too much work. `quiet` tells at which of the
     `factors` of its bandwidth, from below to above, it certainly does not hunt. `unstable` are the states in which its
     loop is unstable.
     """
@@ -46,7 +46,7 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return the parts that are not confirmed, as names of `friso.questions.tune.present_words.DOUBTS`."""
+        """Return the parts that are not confirmed, by names of `friso.questions.tune.present_words.DOUBTS`."""
         if self.word is None:
             return ("given up",)
         parts = {

@@ -24,8 +24,8 @@ class Goal:
     means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file limits
     it.
 
-    The `moves` are those of the stage if none are given. All settled states must keep the modulus `margin` and the
-    `distance` from hunting. `controller` and `joint` tell which parts may change.
+    `moves` None stands for the moves of the stage. All settled states must keep the modulus `margin` and the `distance`
+    from hunting. `controller` and `joint` tell which parts may change.
     """
 
     within: float = 1e-6
@@ -40,7 +40,7 @@ class Goal:
     moves: MoveRange | None = None
 
     def moves_of(self, stage: Stage) -> MoveRange:
-        """Return the moves that machines must make: those of the goal, or those of the stage without any."""
+        """Return the moves that machines must make: the goal's, or else the stage's."""
         return self.moves or MoveRange.of_stage(stage, self.within)
 
     def surely(self, machines: int) -> float:

@@ -1,4 +1,4 @@
-"""Find the smallest change of a controller that meets the goal, starting from settings that meet it."""
+"""Find the smallest change of a controller that meets the goal, starting from settings that do."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAST = ": the least change"
 
 STEPS = np.append(np.linspace(1.0, 1.5, 26), np.geomspace(1.6, 8.0, 14))
 """Powers of the factors of the smallest change that are tried in turn. The smallest change just works on the machines
-of the search, which is not enough for others."""
+of the search, so other machines may need more."""
 
 
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
@@ -45,7 +45,7 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """Return a key that varies between two values, and slightly beyond as far as a stage allows."""
+    """Return a key that varies between two values, and slightly beyond if a stage allows it."""
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
@@ -57,7 +57,7 @@ def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
 
 
 def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
-    """Return a value of a key, or another value if the stage does not allow the first."""
+    """Return `value` for a key, or `otherwise` if the stage does not allow it."""
     try:
         tuned.with_numbers({key: value})
     except InputError:
@@ -66,10 +66,10 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
-    """Return the smallest changes found for a remedy of `least_remedy`, each of shape (variables,).
+    """Yield the smallest changes found for a remedy of `least_remedy`, each of shape (variables,).
 
-    Fewer keys come first, then smaller factors. Single keys are tried first, because any such change is smaller than a
-    change of several keys. Only changes smaller than `most` are returned (see `change_costs`).
+    Fewer keys come first, then smaller factors. Single keys are tried first, because any change of one key counts as
+    smaller than a change of several. Only changes smaller than `most` are returned (see `change_costs`).
     """
     yield from of_one_key(search, most)
     if most >= min(2, len(search.remedy.variables)):
@@ -79,10 +79,10 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 
 
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Return changes of a single variable that work, the smallest first, and all smaller than `most`.
+    """Yield changes of a single variable that work, the smallest first, all smaller than `most`.
 
     They break no constraint, a fraction `enough` of the fresh machines meets the goal, and no machine hunts. With
-    `enough`, values between grid points are not tried: the first answer then has a reserve.
+    `enough`, values between grid points are not tried, so the first answer has a reserve.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -99,14 +99,14 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
         for one in _robust(search, few, enough):
             way = ways[(ways @ (one - home)).argmax()]
             finer = changed(one - way * np.linspace(0, 1, closest)[1:-1, None])
-            closest = 2  # what fails on other machines is taken on in larger steps
+            closest = 2  # after a change that fails on other machines, take larger steps
             for some in search.tries(finer):
                 yield from islice(_robust(search, some, enough), 1)
             yield one
 
 
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Return the points (points, variables) that work on fresh machines, of which none hunts.
+    """Yield the points (points, variables) that work on fresh machines, of which none hunts.
 
     A fraction `enough` of the machines must meet the goal by moves and margins; by default, the least fraction that
     certainly meets the goal.
@@ -133,15 +133,18 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
-    """Return the size of a change as a number: of keys, plus a fraction for the logarithm of the whole factor."""
+    """Return the size of a change as a number.
+
+    Its integer part is the number of keys; its fraction grows with the logarithm of the whole factor.
+    """
     return np.asarray(keys + logarithm / (1 + logarithm))
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
     """Return points from which a search starts, shape (points, variables).
 
-    The first are the working settings, then settings with some keys restored, wholly or half-way in the logarithm,
-    fewest changed keys first.
+    The working settings come first. Then follow settings with some keys restored to the present value, wholly or
+    half-way in the logarithm, the fewest changed keys first.
     """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
@@ -156,7 +159,7 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """Return points to verify, each of shape (variables,), the smallest change first.
+    """Yield points to verify, each of shape (variables,), the smallest change first.
 
     They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
     the working settings, then other points tried. Points that work on fresh machines come before all others.

@@ -1,4 +1,4 @@
-"""Draw machines around a stage, each with a move of its own, and apply changes of the stage to all of them."""
+"""Draw machines around a stage, each with its own move, and apply changes of the stage to all."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
 ACCELERATION = "motion.acceleration"
 
 SPREAD_EVENLY = (golden - 1, np.sqrt(2) - 1)
-"""Steps, modulo 1, of sequences that fill the range from 0 to 1 evenly at any length. They are the golden and the
-silver section, whose continued fractions have the smallest terms, 1 and 2 (Kuipers, Niederreiter 1974, Sec. 2.3)."""
+"""Steps, modulo 1, of sequences that fill the range from 0 to 1 evenly at any length: the golden and the silver
+section. Their continued fractions have the smallest terms, 1 and 2 (Kuipers, Niederreiter 1974, Sec. 2.3)."""
 
 ADDED = int.from_bytes(b"joint")
-"""Second half of Philox's key for the random numbers of a joint that the stage file does not have."""
+"""Second half of Philox's key for the random numbers of a joint that is not in the stage file."""
 
 HALF_WIDTHS = 1.959963984540054
 """Standard deviations in the half-width of a 95 % interval."""
@@ -81,9 +81,9 @@ class Fleet:
     """Machines drawn around a stage, as changes of its keys, all of shape (count,).
 
     `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves of the
-    machines, with `accelerations` [m/s^2] if they differ from that of the file. `moves` is the range from which both
-    were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of
-    others. `left_out` counts invalid draws, which were replaced.
+    machines; `accelerations` [m/s^2] are given if they differ from the file's. `moves` is the range from which both
+    were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of other
+    keys. `left_out` counts invalid draws, which were replaced.
     """
 
     ratios: Mapping[str, np.ndarray]
@@ -109,7 +109,7 @@ class Fleet:
         return replace(self, ratios=ratios, shifts=shifts, sizes=self.sizes[numbers], accelerations=faster)
 
     def with_moves_from(self, smallest: float) -> Fleet:
-        """Return the machines with moves rescaled to begin at `smallest` [m], in unchanged order."""
+        """Return the machines with moves rescaled to begin at `smallest` [m], in the same order."""
         low, high = np.log([self.moves.smallest, self.moves.largest])
         share = (np.log(self.sizes) - low) / (high - low) if high > low else np.ones(self.count)
         sizes = smallest * (self.moves.largest / smallest) ** share
@@ -154,8 +154,8 @@ def draw_fleet(
 ) -> Fleet:
     """Draw machines around a stage as `friso compare` does, each with one of the `moves`.
 
-    The first machine is that of the stage file, with its own move or the nearest one of the range. The other moves fill
-    the range evenly. Without `moves`, all machines make the file's own. Joints that the file does not have vary by the
+    The first machine is the stage file's own, with its own move or the nearest one of the range. The other moves fill
+    the range evenly. Without `moves`, all machines make the file's move. A joint that is not in the file varies by the
     default spreads. Raises InputError.
     """
     own = float(size(stage.flat()))

@@ -49,8 +49,8 @@ from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
 
 Unmade = Literal["rotary", "mode", "extra", "none"]
-"""Reason why no leaf springs make a joint: the axis turns; the machine already has a parasitic mode, so the stage has
-no room for that of leaf springs; an extra package is missing; or no usual size bears the stroke."""
+"""Reason why no leaf springs make a joint: the axis turns; the machine already has a parasitic mode, so there is no
+room for a second one from leaf springs; an extra package is missing; or no usual size bears the stroke."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class Advice:
 
     `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
     misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
-    margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells what to relax if nothing works,
-    and `relaxed_all` whether all of that was tried; `interrupted` tells whether the search was ended early, and
-    `least_sought` whether the smallest change was searched before that.
+    margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal to relax
+    if nothing works, and `relaxed_all` whether all of these were tried. `interrupted` tells whether the search was
+    ended early, and `least_sought` whether the smallest change was searched before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -92,11 +92,11 @@ class Advice:
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """Return the smallest change that works (see `ChangeSize`)."""
+        """Return the smallest change that works (see `ChangeSize`), or None."""
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:
-        """Return a tuned stage with the tables of the machine as built.
+        """Return a tuned stage with the tables that describe the real machine.
 
         Tables that belong to another controller are left out.
         """
@@ -106,7 +106,7 @@ class Advice:
             return tuned
 
     def size(self, outcome: RemedyOutcome) -> ChangeSize:
-        """Return how large the change of a remedy with settings is."""
+        """Return how large the change by a remedy is, for an outcome that has settings."""
         assert outcome.stage is not None
         return change_size(self.stage, outcome.stage)
 
@@ -118,7 +118,10 @@ class Advice:
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work, the smallest change first; leaf springs follow the joint that they make."""
+        """Return the remedies that work, the smallest change first.
+
+        Leaf springs follow the remedy whose joint they make.
+        """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))
 
@@ -146,9 +149,9 @@ def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
 
 
 def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full, given with the smallest change first.
+    """Choose which working remedies to describe in full; they come with the smallest change first.
 
-    They are the smallest change and the one that settles soonest; if these are the same, the next larger change
+    The choice is the smallest change and the one that settles soonest; if these are the same, the next larger change
     follows.
     """
     if not working:
@@ -186,7 +189,7 @@ def tune(
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
     later = (settings.setting_pairs + 2) * (
         _generations(budget) + 4 + settings.progress_steps
-    )  # pairs and the least change, about
+    )  # an estimate, for pairs and the least change
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later)
     progress(0, 0, "compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -264,7 +267,7 @@ def machines_of_search(
     """Return the machines on which searches try settings.
 
     A machine far less robust than nearly all others would weigh too much in so small a sample: it is left out, and
-    another one counts twice. Sampling and delay are taken from the stage `drive`.
+    another one counts twice. Sampling and delay come from the stage `drive`.
     """
     settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
@@ -281,9 +284,9 @@ def machines_of_search(
 
 @dataclass
 class _Session:
-    """Trial of all remedies of a stage in turn, with the `outcomes` so far.
+    """A session that tries all remedies of a stage in turn, with the `outcomes` so far.
 
-    `searching` is the current search, `searches` has all searches by remedy. `least_factor` tells that the smallest
+    `searching` is the current search, and `searches` has all searches by remedy. `least_factor` tells that the smallest
     bandwidth that works is searched, and `is_least` that it was found. All remedies together may take the work
     `allowed`.
     """
@@ -312,7 +315,7 @@ class _Session:
         return any(outcome.certainty == "works" for outcome in self.outcomes)
 
     def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
-        """Try the smallest factor on the bandwidth that works, as a first answer.
+        """Find the smallest factor on the bandwidth that works, as a first answer.
 
         If there is none, or there are no `others` to improve on it, the factor that settles soonest is searched.
         """
@@ -333,10 +336,11 @@ class _Session:
     def tries_all(
         self, listed: Sequence[Remedy], further: Callable[[Sequence[RemedyOutcome], Goal], list[Remedy]]
     ) -> None:
-        """Try remedies, smaller changes first; then the smallest change, and `further` remedies by the outcomes so far.
+        """Try remedies, smaller changes first; then the smallest change; then `further` remedies.
 
-        Settings against friction with more keys than a working remedy are left out, and so are combinations of remedies
-        that work alone. Remedies that cannot be verified come last, and only if nothing works.
+        `further` chooses remedies from the outcomes so far. Settings against friction with more keys than a working
+        remedy are left out, and so are combinations of remedies that work alone. Remedies that cannot be verified come
+        last, and only if nothing works.
         """
         verifiable = [remedy for remedy in listed if remedy.verifiable]
         for own in (True, False):
@@ -354,7 +358,7 @@ class _Session:
                 self.tries(remedy)
 
     def _combines(self, remedy: Remedy) -> bool:
-        """Tell whether a remedy varies the variables of several others, each of which works alone."""
+        """Tell whether a remedy combines the variables of several others, each of which works alone."""
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
         alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
@@ -371,7 +375,7 @@ class _Session:
                 self.outcomes[place] = replace(outcome, windows=around)
 
     def tries(self, remedy: Remedy) -> None:
-        """Try a remedy for the settings that settle soonest, unless all allowed work is used up."""
+        """Search a remedy for the settings that settle soonest, unless all allowed work is used up."""
         if self.allowed is not None and self.allowed.left <= 0:
             self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), cut=True, untried=True))
             return
@@ -380,7 +384,7 @@ class _Session:
         self._ended(search, search.surveyed())
 
     def _made_of_leaves(self, outcome: RemedyOutcome) -> None:
-        """Verify leaf springs for the joint of a remedy, in the way the remedy was verified."""
+        """Verify leaf springs for the joint of a remedy, under the same conditions as the remedy."""
         assert outcome.stage is not None
         remedy = outcome.remedy
         if outcome.stage.axis_kind != LINEAR:
@@ -398,10 +402,10 @@ class _Session:
     def tries_less(self) -> None:
         """Search once for the smallest change of the present controller.
 
-        The search starts from the working remedy of this controller that changes most, then from the one that changes
-        least, if that still is the smallest. If no change of this controller works, it starts from the smallest of the
-        other changes. Unchanged keys lead to a further search of the remaining keys, whose result is taken if it
-        changes less.
+        The search starts from the working remedy of this controller that changes most. A second search starts from the
+        one that changes least, if it still is the smallest. If no change of this controller works, it starts from the
+        smallest of the other changes. If the result leaves keys unchanged, the remaining keys are searched again, and
+        that result is taken if it changes less.
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
@@ -441,7 +445,7 @@ class _Session:
             search, least_changes(search, float(size_cost(size.keys, settings.worthwhile_share * np.log(size.factor))))
         )
         if self.outcomes[-1].stage is None and least.certainty == "works" and not search.cut:
-            self.outcomes.pop()  # none is smaller than what works already
+            self.outcomes.pop()  # no smaller change works
         return True
 
     def tries_large_moves(self) -> None:
@@ -483,12 +487,16 @@ class _Session:
         self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
-        self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # until it has ended
+        # replaced when the search ends
+        self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))
         self.searching = self.searches[remedy.name] = search
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Return the first of a few points that is verified, or else the first of them as not sure to work."""
+        """Record the outcome of the first of a few points that is verified, or else of the first one.
+
+        A point that is not verified is not sure to work.
+        """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
         tries, worked = 0, 0.0
@@ -506,7 +514,7 @@ class _Session:
                 break
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
-            # what took too much computing takes as much with others
+            # after so much computing, other points would take as much
             if tries == settings.most_tries or worked > settings.verifying_work or "given up" in outcome.doubts:
                 break
         tried = search.points if search.tried else None
@@ -524,11 +532,11 @@ class _Session:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
-        """Measure a point on fresh machines, and verify it by its limit cycles if they meet the goal.
+        """Measure a point on fresh machines, and verify it by limit cycles if enough meet the goal.
 
         The machines make all moves, or those from `moves_from` [m] on. The interval of the fraction of machines that
-        meet the goal must lie at the required fraction or above; while it leaves that open, further machines are
-        measured.
+        meet the goal must lie at the required fraction or above. While the interval leaves that open, further machines
+        are measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -615,7 +623,7 @@ class _Report:
         self.progress, self.total, self.done, self.end = progress, total, 0, 0
 
     def begins(self, steps: int) -> None:
-        """Start a remedy with so many progress steps."""
+        """Start a remedy that takes `steps` progress steps."""
         self.done, self.end = self.end, min(self.end + steps, self.total)
 
     def __call__(self, label: str, steps: int = 1) -> None:

@@ -23,7 +23,7 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class RelaxedGoal:
-    """A goal relaxed in up to three parts, which a `remedy` then meets.
+    """A goal relaxed in up to three parts, and a `remedy` that meets it.
 
     It has the stage, the relaxed parts, and the product of the factors by which they are relaxed.
     """
@@ -37,8 +37,8 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation of each kind, the smallest first.
 
-    The distance from hunting is never relaxed. Surveyed machines do not hunt at these points. If an allowance of work
-    is used up, remedies that come later are left out.
+    The distance from hunting is never relaxed: at the points considered, no surveyed machine hunts. If an allowance of
+    work is used up, remedies that come later are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     with suppress(Exhausted):
@@ -71,7 +71,7 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations for a remedy if some parts are `limited` in how far they may be relaxed."""
+    """Return the cheapest relaxations for a remedy if the parts in `limited` may be relaxed only so far."""
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
@@ -121,9 +121,9 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 
 
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
-    """Return by which factor the tolerance must be wider for points, shape (points,).
+    """Return the factors by which the tolerance must be wider at points, shape (points,).
 
-    It is the first of a few factors with which the machines settle within the goal's time, if there is one.
+    Each is the first of a few factors with which the machines settle within the goal's time, if there is one.
     """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
@@ -157,5 +157,8 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
 
 def _time(points: TriedPoints) -> np.ndarray:
-    """Return the settling time within the tolerance, or within the looser one if that is not met [s]."""
+    """Return the settling time [s] within the tolerance.
+
+    If that is not met, it is the time within the looser tolerance.
+    """
     return np.where(np.isfinite(points.settling), points.settling, points.looser)

@@ -27,11 +27,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class Budget:
-    """The numbers of points, generations and machines of a search.
+    """Sizes of a search: points, generations and machines.
 
-    `points` counts the points of a generation for each variable. `refined` generations follow around the best points.
-    Machines for moves and surveys are fewer than the fresh machines on which an answer is measured. `further` machines
-    are added if these leave the answer open.
+    `points` counts the points of a generation for each variable. `refined` further generations search around the best
+    points. `machines` make the moves of the search and `surveyed` are surveyed for hunting; both are fewer than the
+    `fresh` machines on which an answer is measured. `further` machines are added if these leave the answer open.
     """
 
     points: int = 10
@@ -50,9 +50,9 @@ class TriedPoints:
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
     times [s] hold for 95 % of the machines: within the tolerance, within the looser one, and with the bandwidth lower
     by the distance from hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The
-    bandwidth [Hz] is that of the stage file's machine (see `loop_bandwidth`). The nearness of machines to settling runs
-    from 0 to 1 (see `Search.measured`). `moves_from` [m] is the smallest move from which on all machines settle;
-    infinite if the largest move does not settle.
+    bandwidth [Hz] is that of the stage file's machine (see `loop_bandwidth`). `nearness`, from 0 to 1, tells how near
+    the machines are to settling (see `Search.measured`). `moves_from` [m] is the smallest move from which all machines
+    settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -70,7 +70,7 @@ class TriedPoints:
 
     @classmethod
     def none(cls, variables: int) -> TriedPoints:
-        """Return no points at all, of so many variables."""
+        """Return a table without any points, for `variables` variables."""
         none = np.zeros(0)
         return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
 
@@ -96,7 +96,7 @@ class TriedPoints:
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
         """Return the numbers of points that serve moves up to the `largest` [m] but not the small ones.
 
-        They break no constraint on margin, bandwidth and force. The point for the smallest moves comes first.
+        They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
         """
         broken = self.broken(goal)
         some = self.moves_from <= largest / RemedySettings.current().large_share
@@ -104,9 +104,9 @@ class TriedPoints:
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
-        """Return the cost of points: the settling time, or the quantity `wanted` small instead.
+        """Return the cost of points: the settling time, or the quantity `wanted` if given.
 
-        For points that break constraints, it is the amount by which they do.
+        For points that break constraints, the cost is the amount by which they do.
         """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
@@ -123,7 +123,7 @@ def _most(limit: float | None) -> float:
     return np.inf if limit is None else limit
 
 
-@np.errstate(over="ignore")  # a force that is not finite counts otherwise
+@np.errstate(over="ignore")  # forces that are not finite are excluded elsewhere
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
     """Return by which fraction values exceed a limit."""
     return np.maximum(0, values / _most(limit) - 1)
@@ -131,7 +131,7 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 
 @dataclass
 class Search:
-    """The search for the best points of a remedy on `machines`.
+    """Search for the best points of a remedy on `machines`.
 
     Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
     surveyed points at which machines hunt, or may hunt. `cut` tells that the search took too much work.
@@ -165,8 +165,8 @@ class Search:
     ) -> None:
         """Try points until they no longer improve, or until that takes too much work (`cut`).
 
-        The search minimises the settling time, or the quantity `wanted` small: a function from points (points,
-        variables) to numbers (points,). A search of several variables may begin with the points `start`.
+        The search minimises the settling time, or the quantity `wanted`: a function from points (points, variables) to
+        numbers (points,). A search of several variables may begin with the points `start`.
         """
         with self._allowed(self._work):
             self._optimise(wanted, start)
@@ -203,7 +203,7 @@ class Search:
 
     @contextmanager
     def _allowed(self, work: float) -> Iterator[Allowance]:
-        """Allow so much work in the `with` block; if it is exceeded, mark the search as `cut`."""
+        """Limit the work within the `with` block; if that is exceeded, mark the search as `cut`."""
         with allowance(work) as spent:
             try:
                 yield spent
@@ -326,7 +326,7 @@ class Search:
                 settling[at], looser[at], force[at] = moves.settling, moves.looser, moves.force
                 left = worth_it(left)
         rests = np.isfinite(looser[left]).any(axis=1)
-        slower[left[~rests]] = np.inf  # those that settle nowhere are not asked whether they do at a lower bandwidth
+        slower[left[~rests]] = np.inf  # machines that settle nowhere are not run at a lower bandwidth
         left = left[rests]
         for part in (order[: settings.first_machines], order[settings.first_machines :]):
             if left.size and part.size:
@@ -376,8 +376,8 @@ class Search:
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
         """Yield the best points of shape (variables,) at which no machine hunts.
 
-        Points that settle soonest, or have the least of the quantity `wanted` small, come first. Enough fresh machines
-        must meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
+        Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
+        meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
         farther away, because the best points are often at the limit of what works. If there are none, the point that
         serves most fresh machines is yielded.
         """
@@ -385,7 +385,7 @@ class Search:
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], settings.alike_share
-        away = np.full(len(left), np.inf)  # from those that were looked at
+        away = np.full(len(left), np.inf)  # distance from the inspected points
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
         soonest = left[:1]
@@ -422,10 +422,10 @@ class Search:
             yield from best[self.clear(best)]
 
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
-        """Return better points near a point (variables,), which was taken because better ones failed, the best first.
+        """Return better points near a point (variables,), the best first.
 
-        At the failed points machines hunted, or too few met the goal. New points are drawn around the point, then
-        around the point taken next.
+        The point was taken because better ones failed: there machines hunted, or too few met the goal. New points are
+        drawn around the point, then around the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -453,7 +453,7 @@ class Search:
 
 
 def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the smallest move from which on all machines settle (points, machines), shape (points,).
+    """Return the smallest move from which all machines settle (points, machines), shape (points,).
 
     It is infinite where the machine with the largest move does not settle.
     """
@@ -463,12 +463,12 @@ def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-    """Return the quantity by which points are sorted, (n,): the settling time, or the quantity `wanted` small."""
+    """Return the quantity by which points are sorted, (n,): the settling time, or `wanted` if given."""
     return points.settling if wanted is None else wanted(points.shares)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell which points (points, variables) equal which others, shape (points, others)."""
+    """Tell which points (points, variables) are equal to which of the others, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
@@ -496,7 +496,7 @@ def _evolve(
         nonlocal most
         costs = cost(points, most)
         if not np.ndim(most):
-            most = float(costs.max())  # before the first generation has ended, their order is not told
+            most = float(costs.max())  # until the first generation has ended, the order of its points is unknown
         return costs
 
     def ended(intermediate_result: Any) -> bool:
@@ -510,7 +510,7 @@ def _evolve(
         maxiter=generations - 1,
         init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
         tol=0.0,
-        atol=-1,  # never by itself, not even where all costs are the same
+        atol=-1,  # never stop by this tolerance, even if all costs are equal
         callback=ended,
         rng=settings.optimiser_seed,
         polish=False,
@@ -530,7 +530,7 @@ def _agree(intermediate_result: Any) -> bool:
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """Return the first points, at most `most`, that lie at least `apart` from each other."""
+    """Return the first points, at most `most`, each at least `apart` from those before."""
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

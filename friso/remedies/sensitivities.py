@@ -47,7 +47,7 @@ ENTERED = STATISTICS.index("inner_exit")
 """Column of the statistics with the time at which a run last entered the band."""
 
 START = "motion.displacement"
-"""The key of the motion that is not part of the reference: the start of a release."""
+"""Key of the motion that gives the start of a release. It is the only one that is not part of the reference."""
 
 TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
 """Prefixes of keys on which the limit cycle may depend."""
@@ -55,9 +55,9 @@ TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmissio
 
 @dataclass(frozen=True)
 class EdgeDerivatives:
-    """The edge of hunting as a bandwidth [Hz], and its derivatives by keys [per SI unit], (keys,).
+    """Edge of hunting as a bandwidth [Hz], and its derivatives by keys [per SI unit], (keys,).
 
-    For a controller that sets no bandwidth, the edge is a multiple of the present one.
+    For a controller that states no bandwidth, the edge is a multiple of the present speed.
     """
 
     edge: float
@@ -193,7 +193,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """Return the stage with equations that contain all given keys.
 
-    Without this, an exponent that is a whole number, for example, is built in as a constant. Raises InputError for a
+    An exponent that is a whole number, for example, would otherwise be built in as a constant. Raises InputError for a
     key that equations never contain.
     """
     decisive = [name for name in keys if name in decisive_keys(flat)]
@@ -208,14 +208,14 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """Return the derivatives of the edge; without an `edge`, that of a check is used."""
+    """Return the derivatives of the edge; without `edge`, a check finds the edge first."""
     edge = check_given(stage).judgement.margin if edge is None else edge
     moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
     if edge is None or moved is None:
         return None
     named = bandwidth(stage.flat())
     hertz = edge.factor * (1.0 if named is None else float(named))
-    stated = controller_of(flat).bandwidth_key  # the edge itself stays where it is when that changes
+    stated = controller_of(flat).bandwidth_key  # the edge does not move with the key that states the bandwidth
     relative = moved + np.array([float(name == stated) for name in keys])
     return EdgeDerivatives(hertz, hertz * relative / np.array([flat[name] for name in keys]))
 
@@ -251,7 +251,8 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     settling = float(entered[0] - corner)
     if not _is_smooth(flat, keys, until, float(entered[0]), settling, by, within):
         return None
-    results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)  # once, however many turns there are
+    # a single run, with room for all turns
+    results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)
     if not _all_done(results):
         return None
     turns = slice(int(results.turn_counts[0]))
@@ -276,9 +277,9 @@ def _is_smooth(
 ) -> bool:
     """Tell whether the settling time changes smoothly with each key.
 
-    The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a
-    little either way, and the new times are compared with the derivatives. They differ if the stage bounces on its
-    limiter so often that neighbouring motions part.
+    The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a little
+    either way, and the new times are compared with what the derivatives `by` predict. They differ if the stage bounces
+    on its limiter so often that neighbouring motions diverge.
     """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])
@@ -330,7 +331,7 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
     omega = np.array([2 * np.pi * closest.closest])
 
     def distance(changes: Mapping[str, float]) -> float:
-        """Return the distance of the loop from -1 with some keys changed."""
+        """Return the distance of the loop from -1 at the changed keys."""
         nearby = {**flat, **changes}
         return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
 

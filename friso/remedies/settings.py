@@ -21,20 +21,19 @@ class RemedySettings(Settings):
     """Factor by which keys may go in the other direction, which rarely is a smaller change."""
 
     other_settings: int = setting(24, "")
-    """Settings that are inspected from the smallest change on. More of them cost moves."""
+    """Settings that are inspected, from the smallest change on. Each further one costs moves."""
 
     values_alone: int = setting(24, "")
     """Values tried for a single key. Fewer overshoot its smallest change; each costs a move of all machines."""
 
     finer_values: int = setting(8, "")
-    """Values between the last two of a single key. They halve the smallest change three times more."""
+    """Values tried between the last two of a single key. They narrow the smallest change down by three halvings."""
 
     change_parts: tuple[float, ...] = setting((0.15, 0.3, 0.5, 0.7), "")
-    """Places between the smallest change and the working settings at which others are tried."""
+    """Places between the smallest change and the working settings at which other points are tried."""
 
     machine_factor: int = setting(2, "")
-    """Factor on the number of machines for the smallest change, which lies at the limit of what works and often fails.
-    """
+    """Factor on the number of machines for the smallest change. It lies at the limit of what works and often fails."""
 
     smallest_move: float = setting(10.0, "")
     """Smallest move without [moves], in tolerances. A stage in position hardly leaves its place for shorter ones."""
@@ -46,31 +45,31 @@ class RemedySettings(Settings):
     """Best points of a remedy that are verified. If all fail on fresh machines, it does not work."""
 
     most_looks: int = setting(12, "")
-    """Points inspected on fresh machines. More take minutes and have found nothing better."""
+    """Points inspected on fresh machines. More take minutes and have not led to better ones."""
 
     bandwidths_beside: int = setting(2, "")
-    """Bandwidths on either side at which a tuned stage is judged, between the required distance from hunting and as far
-    above. With two they are 1.095 apart, closer than the steps of a search for an edge. Fewer may miss a window;
-    each costs as much as the stage's own."""
+    """Bandwidths on either side at which a tuned stage is judged, from the required distance below to as far above.
+    With two they are 1.095 apart, closer than the steps of a search for an edge. Fewer may miss a window; each costs as
+    much as the stage's own."""
 
     confirming_work: float = setting(4e8, "")
-    """Work to confirm a tuned stage, about 5 s on one core, and as much for the bandwidths beside it. Most take a
-    tenth; beyond it the stage is not sure to work."""
+    """Work to confirm a tuned stage, about 5 s on one core, and as much for nearby bandwidths. Most stages take a tenth
+    of it; a stage that takes more is not sure to work."""
 
     present_check_work: float = setting(3e8, "")
     """Work to check the present stage, about 4 s on one core. With less, more stages have no edge located."""
 
     verifying_work: float = setting(1.2e9, "")
-    """Work to verify a remedy, about 15 s on one core; beyond it no other point is verified."""
+    """Work to verify a remedy, about 15 s on one core. Once it is exceeded, no other point is verified."""
 
     progress_steps: int = setting(20, "")
-    """Progress steps of a verification, which takes as long as so many generations."""
+    """Progress steps of a verification, which takes as long as this many generations."""
 
     setting_pairs: int = setting(2, "")
     """Settings against friction that are combined with the bandwidth. More take minutes."""
 
     fresh_seed: int = setting(1000, "")
-    """Seed of the fresh machines among which the best points are chosen."""
+    """Seed of the fresh machines on which the best points are chosen."""
 
     unseen_seed: int = setting(2000, "")
     """Seed of the unseen machines on which the chosen settings are measured."""
@@ -120,8 +119,9 @@ class RemedySettings(Settings):
     at a quarter of the cost."""
 
     further_parts: tuple[float, ...] = setting((1 / 12, 1 / 3), "")
-    """Fractions of the further machines after which the interval is examined. With more looks more settings pass by
-    chance: with these, one in forty of those right for exactly the required fraction; with two more, one in thirty."""
+    """Fractions of the further machines after which the interval is examined. With more examinations, more settings
+    pass by chance: with these two, one in forty of the settings with exactly the required fraction; with two more, one
+    in thirty."""
 
     survey_batch: int = setting(3, "")
     """Points whose machines are surveyed at once. Fewer leave cores idle; more are surveyed in vain."""
@@ -134,7 +134,7 @@ class RemedySettings(Settings):
 
     tuning_work: float = setting(1.5e9, "")
     """Work for all remedies of the controller but the first, about 18 s on one core, and as much for remedies that buy
-    a joint. Remedies left then are not tried, which the answer says."""
+    a joint. Remedies left then are not tried, and the answer says so."""
 
     search_work: float = setting(4e8, "")
     """Work for a search, about 5 s on one core. Less ends a search of four keys early."""
@@ -149,10 +149,11 @@ class RemedySettings(Settings):
     """Factor above the limit of the bandwidth beyond which a point is penalised as far above."""
 
     near_ranges: tuple[float, ...] = setting((0.12, 0.12, 0.03), "")
-    """Widths of the ranges in which the search continues about its best point, in turn, over the whole range."""
+    """Widths of the ranges, relative to the whole range, in which the search continues around its best point, in
+    turn."""
 
     hopeless_generations: int = setting(4, "")
-    """Generations after which a search may be abandoned. Fewer end one whose first points lie badly."""
+    """Generations after which a search may be abandoned. Fewer would end a search whose first points lie badly."""
 
     hopeless_nearness: float = setting(0.5, "")
     """Fraction of machines that settle with the best point below which a search is abandoned."""
@@ -164,7 +165,7 @@ class RemedySettings(Settings):
     """Relative difference of costs at which generations have converged."""
 
     bandwidth_reserve: float = setting(1e-3, "")
-    """Distance of bandwidths below their limit, for rounding."""
+    """Distance of bandwidths from their limit, below it, to allow for rounding."""
 
     apart_share: float = setting(0.03, "")
     """Smallest distance between surveyed points, over the ranges. Nearer ones hunt if their neighbour does."""
@@ -185,7 +186,7 @@ class RemedySettings(Settings):
     """Half-width of the first range in which points are drawn around another, over the ranges."""
 
     most_closer: int = setting(4, "")
-    """Halvings of that range. Nearer points are the same settings."""
+    """Halvings of that range. Nearer points are practically equal settings."""
 
     widened_factor: float = setting(1.5, "")
     """Factor on the distance of the next points after a batch with hunting."""
@@ -204,7 +205,7 @@ class RemedySettings(Settings):
     """
 
     move_rtol: float = setting(1e-6, "")
-    """Tolerance of reported moves, whose settling times are then exact in three digits."""
+    """Tolerance of reported moves. Their settling times are then accurate to three digits."""
 
     looser_tolerance: float = setting(10.0, "")
     """Factor of a looser tolerance, which shows how near machines are to settling."""
@@ -226,7 +227,7 @@ class RemedySettings(Settings):
     """Shortest and longest stroke of a joint. Shorter ones isolate nothing; longer ones are not leaf springs."""
 
     snap_share: float = setting(0.02, "")
-    """Relative difference to the present number below which that is kept."""
+    """Relative difference from the present number below which the present number is kept."""
 
     rounded_share: float = setting(2e-3, "")
     """Largest relative error of margin and bandwidth by rounding of tuned numbers."""
@@ -238,7 +239,7 @@ class RemedySettings(Settings):
     """Halvings that locate the end of a window, to a sixteenth of a step."""
 
     window_end_share: float = setting(0.05, "")
-    """Fraction of a window next to its end in which a number is said to lie at that end, where little of it is left."""
+    """Fraction of a window, next to its end, in which a number is reported to lie at that end."""
 
     surveyed_halvings: int = setting(2, "")
     """Halvings that locate the end of a window where machines begin to hunt. Each costs surveys of all machines."""

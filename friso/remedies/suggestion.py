@@ -26,8 +26,8 @@ DAMPING = (0.05, DAMPING_RATIOS[1])
 class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` tells that the stage does not hunt at its bandwidth and down to the distance below it. `margin` is the
-    least modulus margin of all settled states. If no joint settles, it is the last one tried.
+    `settles` tells that the stage hunts neither at its bandwidth nor down to the distance below it. `margin` is the
+    least modulus margin of all settled states. If no joint settles, this is the last one tried.
     """
 
     stage: Stage
@@ -57,7 +57,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
     )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
-    flat = {**free.flat(), **numbers, "motion.kind": "release"}  # what attracts matters, whatever the motion
+    flat = {**free.flat(), **numbers, "motion.kind": "release"}  # only attractors matter, not the motion
     attracts = np.zeros(len(tried), bool)
     for factor in (1.0, 1 / Goal.distance):
         attracted = find_attractors(faster(flat, factor), len(tried), close_orbits=False)

@@ -1,4 +1,4 @@
-"""Try points on machines, all of them at once in the engine's lanes."""
+"""Try points on machines, all machines at once in the engine's lanes."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
 
 RANKING = 1e-5
-"""Relative tolerance of the moves by which settings are compared. It halves the steps; settling times are off by a
-thousandth, usually by a tenth of that."""
+"""Relative tolerance of the moves by which settings are compared. It halves the number of steps; settling times are off
+by at most a thousandth, usually by a tenth of that."""
 
 
 @dataclass(frozen=True)
 class Moves:
     """Moves of points on machines, all arrays of shape (points, machines).
 
-    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`); a
-    second time holds for the looser tolerance. Both are infinite if the stage is not in position when the reference
+    `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`), and
+    `looser` [s] the time for the looser tolerance. Both are infinite if the stage is not in position when the reference
     leaves or the run ends. `force` [N] is the largest force.
     """
 
@@ -42,12 +42,12 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """Return the settling time [s] that a fraction of the machines keeps at each point, (points,)."""
+        """Return the settling time [s] that a fraction `share` of the machines keeps at each point, (points,)."""
         return quantile(self.settling, share)
 
 
 def quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """Return for each row the least value that a given fraction of the row does not exceed."""
+    """Return for each row the least value that a fraction `share` of the row does not exceed."""
     ordered = np.sort(values, axis=-1)
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 
@@ -65,7 +65,7 @@ def moves_of_points(
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
     options = RunOptions(rtol=rtol, bands=(goal.within, settings.looser_tolerance * goal.within), record_from=np.inf)
-    most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # what is above is rounding
+    most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # any excess is rounding
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
         done = np.equal(runs.results.statuses, Status.DONE)
         settling[runs.numbers] = np.where(done, settling_of_runs(runs.part(flat), runs, "inner"), np.inf)
@@ -101,8 +101,8 @@ def modulus_margins(
 class Attraction:
     """Result of a survey for hunting of machines, with arrays of shape (points, machines).
 
-    `attracts` tells whether a machine hunts at its bandwidth or down to the distance below it. Further arrays tell
-    whether simulations decided that, and whether it is `certain` because no other attractor can exist.
+    `attracts` tells whether a machine hunts at its bandwidth or down to the distance below it. `decided` tells whether
+    simulations decided that, and `certain` whether in addition no other attractor can exist.
     """
 
     attracts: np.ndarray
@@ -111,11 +111,11 @@ class Attraction:
 
     @classmethod
     def none(cls, machines: int) -> Attraction:
-        """Return one point at which none of so many machines hunts."""
+        """Return one point at which none of `machines` machines hunts."""
         return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
 
     def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
-        """Return a copy in which another result holds for some machines, given by their numbers."""
+        """Return a copy in which the numbered machines have another result."""
         columns = {name: column.copy() for name, column in vars(self).items()}
         for name, column in columns.items():
             column[:, machines] = getattr(other, name)
@@ -143,10 +143,10 @@ def attraction(
 ) -> Attraction:
     """Survey whether the machines hunt at points.
 
-    Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance: the lowest first,
-    where most machines hunt, or all `at_once`, which is faster where hardly any does. An undecided bandwidth ends the
-    survey of a machine, and a point with fewer than the fraction `enough` of quiet machines ends with it. Simulations
-    start from many states; closed orbits confirm the final answer.
+    Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance. The lowest
+    bandwidth comes first, because most machines hunt there; or all come `at_once`, which is faster if hardly any
+    machine hunts. An undecided bandwidth ends the survey of a machine, and a point with fewer than the fraction
+    `enough` of quiet machines ends with it. Simulations start from many states; closed orbits confirm the final answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

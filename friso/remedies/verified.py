@@ -29,7 +29,7 @@ from friso.studies.compare.options import linear_flat
 from friso.studies.compare.statistics import quantile_interval
 
 ONE = np.zeros((1, 0))
-"""Coordinates of the one point of a remedy without variables."""
+"""Coordinates of the only point of a remedy without variables."""
 
 Certainty = Literal["works", "large moves", "unsure", "given up", "does not work"]
 
@@ -39,10 +39,10 @@ class Performance:
     """Measurements of a stage on machines, in rows of one point.
 
     They are its `moves`, the modulus margins, and whether the machines hunt. `own_margin` is the least modulus margin
-    of the stage itself in all settled states. `stiffness` [N/m] is its stiffness against a load. Of `further` machines,
-    shape (n,), only whether they meet the whole goal is stored. `sizes` [m] are the moves of all machines, the further
-    ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which machines
-    hunt.
+    of the stage itself in all settled states, and `stiffness` [N/m] its stiffness against a load. For `further`
+    machines, shape (n,), it is only stored whether they meet the whole goal. `sizes` [m] are the moves of all machines,
+    the further ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which
+    machines hunt.
     """
 
     moves: Moves
@@ -65,7 +65,7 @@ class Performance:
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
-        """Return the 95 % interval of the time in which 95 % settle, for machines as a sample."""
+        """Return the 95 % interval of the time in which 95 % settle, taking the machines as a sample."""
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
@@ -96,16 +96,18 @@ class Performance:
     def share(self, goal: Goal) -> Share:
         """Return the probability that a machine meets the whole goal, with its interval.
 
-        Without a survey, the machines that meet the rest may hunt: the probability is NaN and only its limit is known.
+        Without a survey, machines that meet all other parts may still hunt: the probability is NaN and only its upper
+        limit is known.
         """
         meets = self._all_meeting(goal)
         whole = share(meets, np.ones(meets.shape, bool))
         return whole if self.is_surveyed else Share(np.nan, 0.0, whole.high)
 
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
-        """Return the smallest and largest move [m] between which the goal holds; None if there are none or none known.
+        """Return the smallest and largest move [m] between which the goal holds, or None.
 
-        Of any number of moves next to either end, at least the required fraction meets the goal.
+        Of any number of moves next to either end, at least the required fraction meets the goal. The result is None if
+        there are no such moves, or the moves are unknown.
         """
         order = np.argsort(self.sizes, kind="stable")
         if self.moves_drawn is None or not order.size or not self.is_surveyed:
@@ -131,10 +133,10 @@ class Performance:
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
-        """Return the performance with a survey for hunting of the machines that meet the rest of the goal.
+        """Return the performance with a survey for hunting of the machines that meet all other parts.
 
         A few machines are surveyed first. If so many of them hunt that too few can meet the goal, the others are left
-        out: the fraction is then that of fewer machines.
+        out: the fraction is then one of fewer machines.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
@@ -145,7 +147,7 @@ class Performance:
     def _surveyed(
         self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
     ) -> Performance:
-        """Return the performance with a survey of numbered machines that meet the rest of the goal."""
+        """Return the performance after surveying numbered machines that meet all other parts of the goal."""
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:
             return self
@@ -170,7 +172,7 @@ class Performance:
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     """Return the first and last place of the run of places that best meets the goal.
 
-    Every part of the run that touches one of its ends meets the goal with at least the required fraction. Returns None
+    Each part of the run that touches one of its ends meets the goal with at least the required fraction. Returns None
     if no run is long enough to show that.
     """
     if meets.all():
@@ -184,16 +186,16 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class RemedyOutcome:
-    """The outcome of a remedy: its best `stage`, the performance, and whether it surely works.
+    """Outcome of a remedy: its best `stage`, the performance, and whether it surely works.
 
-    `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; without any, it works.
+    `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; if there are none, it works.
     `windows` give how far each number may vary. `confirmation` is the search for hunting of the stage itself; None if
     too many machines miss the goal.
 
-    `points` are all settings tried; `attracted` counts the ones dropped because machines hunted. `shares` are the
+    `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
     coordinates of the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that
-    others had taken all of it. `moves_from` [m] is the smallest move for which the stage was verified, if it serves
-    large moves only.
+    other remedies had taken all of it. `moves_from` [m] is the smallest move for which the stage was verified, if it
+    serves large moves only.
     """
 
     remedy: Remedy
@@ -241,7 +243,7 @@ def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performan
 
 
 def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[str, Any]:
-    """Return moves and margins on machines by field of `Performance`, marked as not surveyed yet."""
+    """Measure moves and margins on machines; return them by field of `Performance`, not surveyed yet."""
     remedy = Remedy.settled_on("", stage)
     return {
         "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),
@@ -263,16 +265,19 @@ def _stiffness(flat: Mapping[str, Any]) -> float:
 
 
 def checked(stage: Stage) -> Case:
-    """Check a stage as `friso check` does, with less work; the edge of hunting is included if it is soon located."""
+    """Check a stage as `friso check` does, with less work.
+
+    The edge of hunting is included if it is located soon.
+    """
     try:
         with allowance(RemedySettings.current().present_check_work):
             return check_given(stage)
-    except Exhausted:  # in a part that a check does not give up
+    except Exhausted:  # raised by a part that must not be left out
         return check_given(stage)
 
 
 def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return why the stage itself is not sure to work: verdicts, bandwidth, margin.
+    """Return why the stage itself is not sure to work: verdict, bandwidth, margin.
 
     The reasons are names of `friso.questions.tune.present_words.DOUBTS`.
     """

@@ -15,7 +15,7 @@ from friso.remedies.settings import RemedySettings
 
 @dataclass(frozen=True)
 class VariableWindow:
-    """The range from `low` to `high` of a variable around its tuned `value` in which machines meet the goal.
+    """Range from `low` to `high` of a variable around its tuned `value`, in which machines meet the goal.
 
     All three are in SI, or factors; everything else is as tuned. `open_below` and `open_above` tell that the range
     reaches an end of the search.
@@ -80,7 +80,7 @@ def _halve(
 ) -> None:
     """Bisect between the last places that work and the next ones that do not, (variables, 2).
 
-    `ends` selects some of the ends by numbers of variables and sides, (n, 2).
+    `does` tells whether places work. `ends` selects some of the ends by numbers of variables and sides, (n, 2).
     """
     rows, sides = ends.T
     for _ in range(halvings if len(ends) else 0):
@@ -90,7 +90,7 @@ def _halve(
 
 
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether points meet the goal by moves and margins if one variable each is moved.
+    """Tell whether points meet the goal by moves and margins, each with one variable moved.
 
     `numbers` (n,) select the variables, and `places` (n,) are their new coordinates.
     """

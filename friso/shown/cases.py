@@ -37,7 +37,7 @@ class ShownCase:
 def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
     """Return the cases, each once.
 
-    If "given" repeats the locked or the free case, that case is labelled "(as given)".
+    If the case "given" equals the locked or the free case, that case is labelled "(as given)".
     """
     labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
     return tuple(ShownCase(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
@@ -49,7 +49,10 @@ def case_labels(stage: Stage) -> dict[str, str]:
 
 
 def _labels(names: Collection[str], stage: Stage | None) -> dict[str, str]:
-    """Return labels by name; the case that equals the stage as given says so."""
+    """Return labels by name.
+
+    The label of the case that equals the stage as given says so.
+    """
     joint = stage.joint if stage else None
     variant = "locked" if joint and joint.locked else "free"
     twin = variant if joint and variant in names else None

@@ -1,4 +1,4 @@
-"""Provide what all JSON documents share."""
+"""Provide the parts that all JSON documents share."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def plain_json(value: Any) -> Any:
 
 
 def unit_suffix(unit: str) -> str:
-    """Return the suffix of a key for a unit: "_n_s_per_m" for "N*s/m", empty without a unit."""
+    """Return the suffix of a key for a unit: "_n_s_per_m" for "N*s/m", "" without a unit."""
     return f"_{unit.lower().replace('*', '_').replace('/', '_per_').replace('^', '')}" if unit else ""
 
 

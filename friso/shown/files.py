@@ -10,10 +10,11 @@ from friso.shown.drawing.figure import Figure
 from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
 
 Content = str | bytes | Callable[[Path], object] | None
-"""A text, bytes, or what writes the file to the path that it is called with; None: one of an earlier run is deleted."""
+"""Content of a file: a text, bytes, or a function that writes the file to a given path. None deletes the file of an
+earlier run."""
 
 Files = Mapping[str, Content]
-"""Names, relative to the folder of the command, to contents; in the order in which they are listed."""
+"""Contents of files by name, relative to the folder of the command, in the order in which they are listed."""
 
 
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:

@@ -1,4 +1,4 @@
-"""Link words on a page to the glossary at its end, each where it first stands."""
+"""Link words on a page to the glossary at its end, each word at its first occurrence."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class GlossaryRow:
 def entries() -> Mapping[str, GlossaryRow]:
     """Return the rows of the glossary by their words in small letters.
 
-    Words with this meaning in one context only stand there as "slope (of the return map)". They are left out, since
-    pages use them in other contexts, too.
+    A word that has its meaning in one context only, such as "slope (of the return map)", is left out, because pages
+    also use it in other contexts.
     """
     text = (resources.files("friso.shown") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
@@ -57,7 +57,7 @@ def _any_word() -> re.Pattern[str]:
 
 
 class Glossary:
-    """The rows of the glossary `used` on one page, in the order of their first words."""
+    """The rows of the glossary that one page uses, in the order in which their words first occur."""
 
     def __init__(self) -> None:
         self.used: dict[str, GlossaryRow] = {}

@@ -1,4 +1,4 @@
-"""Say that a loop is unstable, which comes before anything that friction does."""
+"""Say that a loop is unstable, which matters more than anything that friction does."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:
-    """Say in which states the loop of the stage as given is unstable; nothing for a stable loop."""
+    """Say in which states the loop of the stage as given is unstable; [] for a stable loop."""
     return [f"The loop of the stage as its file gives it is {unstable_where(states)}."] if states else []
 
 

@@ -1,4 +1,4 @@
-"""Say how a stage follows its reference, where that stands, and what moves are too short for."""
+"""Say how a stage follows its reference, where that rests, and which limits moves do not reach."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def following_sentence(tracking: Tracking) -> str:
 
 
 def off_its_reference(largest: float, rms: float) -> str:
-    """Say how far a stage is off its reference in the end, at most and as root mean square [m]."""
+    """Say how far a stage ends off its reference [m], at most and as root mean square."""
     size = f"{with_unit(largest, 'm')} (RMS {with_unit(rms, 'm')})"
     return f"is off its reference, which keeps moving, by up to {size} in the last quarter of the run"
 
@@ -65,7 +65,7 @@ def _settling(dwell: Dwell) -> str:
 def motion_sentences(stage: Stage) -> list[str]:
     """Say if the reference begins with a jump, and which motion limits short moves do not reach.
 
-    Empty if neither applies.
+    The result is empty if neither applies.
     """
     flat, kind = stage.flat(), axis_shown()
     jump = float(reference(flat, np.zeros(1))[0]) - float(initial_displacement(flat))

@@ -1,6 +1,6 @@
 """Write every page of friso from one skeleton, with the answer first.
 
-The template of a command may change parts of it.
+A command's own template may change parts of the skeleton.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def made_with() -> str:
 
 
 OWN_TEMPLATES = "friso.shown"
-"""The package with friso's own templates, which those of others extend."""
+"""The package with friso's own templates, which other packages' templates extend."""
 
 CONTENTS: Mapping[str, Any] = MappingProxyType(
     {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
@@ -52,9 +52,9 @@ follows the version of friso and has no full stop.
 class Report:
     """The page of a `command`: name, figures, stage file, and contents by name.
 
-    `values` holds the contents named in `CONTENTS`, and what else the template of the command names. That template, if
-    there is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
-    templates of the package `templates`. `scripted` pages load plotly without figures of their own kind.
+    `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
+    is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
+    templates of the package `templates`. Pages that are `scripted` load plotly even without figures of their own kind.
     """
 
     command: str
@@ -77,7 +77,7 @@ class Report:
         templates: str = OWN_TEMPLATES,
         **values: Any,
     ) -> Report:
-        """Return the page about a stage, or about none.
+        """Return the page about a stage, or about no stage.
 
         `name` stands at the head if the stage has no name.
         """
@@ -93,7 +93,7 @@ class Report:
         scripts = plotly_renderer.script() if figures or self.scripted else None
         values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
         values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
-        assert not values.keys() & self.values.keys()  # a value of a command's page may not stand in for these
+        assert not values.keys() & self.values.keys()  # a command's value must not replace one of these
         template = environment(self.templates).select_template([f"{self.command}.html", "page.html"])
         return template.render(**{**values, **CONTENTS, **self.values})
 
@@ -139,28 +139,28 @@ def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup
 
 
 def _plain(svg: str) -> str:
-    """Return an SVG as it may stand in an address in quotation marks, half as long as in base64."""
+    """Return an SVG escaped for an address in quotation marks, half as long as in base64."""
     element = re.sub(r"\s+", " ", _UNSEEN.sub("", svg[svg.index("<svg") :]))
     return _PATH.sub(_shortened, element).translate(_IN_ADDRESSES)
 
 
 _UNSEEN = re.compile(r'<!--.*?-->|<metadata>.*?</metadata>|(?<=<g) id="[^"]*"', re.DOTALL)
-"""Parts of an SVG that nothing shows or refers to, such as names of groups."""
+"""Parts of an SVG that are neither shown nor referred to, such as names of groups."""
 
 _PATH, _SPACED = re.compile(r'(?<= d=")[^"]*'), re.compile(r" ?([A-Za-z]) ?")
-"""The lines of an element, and their commands, which need no blanks."""
+"""Patterns of the path of an SVG element, and of its commands, which need no blanks."""
 
 _STRAIGHT = re.compile(r"(?:[ML] -?[\d.]+ -?[\d.]+ ?|z ?)+")
-"""Lines of straight pieces alone."""
+"""Pattern of paths that consist of straight pieces alone."""
 
 TENTHS = 10
-"""Places of a line, to a point of 1/72 inch: finer than printers' dots."""
+"""Steps of a coordinate in a point of 1/72 inch, finer than printers' dots."""
 
 
 def _shortened(path: re.Match[str]) -> str:
-    """Write the lines of an SVG path in less text.
+    """Write an SVG path in less text.
 
-    Lines are straight from each place to the next, to a tenth of a point.
+    Places are relative to the ones before, to a tenth of a point.
     """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])
@@ -181,7 +181,10 @@ def _shortened(path: re.Match[str]) -> str:
 
 
 def _tenths(number: int, apart: bool) -> str:
-    """Write a number of tenths; `apart` separates it from a number before it unless its sign does."""
+    """Write a number of tenths.
+
+    `apart` separates it from a number before it, unless its sign does.
+    """
     text = f"{number / TENTHS:g}".replace("0.", ".", 1) if abs(number) < TENTHS else f"{number / TENTHS:g}"
     return f" {text}" if apart and number >= 0 else text
 

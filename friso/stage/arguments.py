@@ -92,7 +92,7 @@ def _are_numbers(value: Any) -> bool:
 
 
 MOST_INT = 10**18
-"""Bound for whole numbers, whatever they count."""
+"""Bound for all whole numbers, whatever they count."""
 
 MOST_SEED = 2**31 - 1
 """Largest seed that every random number generator accepts."""
@@ -224,7 +224,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
 
     It raises InputError for an argument of another type, or for a path that does not exist, and TypeError for an
     unknown keyword. Where a Stage is expected, its file or tables are accepted as well. Raises KeyError for an
-    annotation that is no kind of argument.
+    annotation that is not in `KINDS`.
     """
     parameters = signature(function)
     kinds = {
@@ -270,9 +270,9 @@ def _read_stage(source: Any) -> Stage:
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
-    """Raise InputError for an argument of none of the kinds, or for an unusable path.
+    """Raise InputError for an argument that fits none of its kinds, or for an unusable path.
 
-    With `sets`, keys can be set, and a dictionary was meant for that.
+    With `sets`, the function has an option to set keys, and the error suggests it for a dictionary.
     """
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))

@@ -17,12 +17,14 @@ from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
 def _falls(flat: Mapping[str, Any]) -> Any:
     """Tell whether static friction is at least Coulomb friction under the operating conditions.
 
-    It is true for laws that do not have both.
+    The answer is true for laws that do not have both. It is also true if static friction is smaller without the
+    conditions, because the law reports that.
     """
     if not {"friction.static", "friction.coulomb"} <= {*flat}:
         return True
     static, coulomb = (flat[f"friction.{x}"] * flat.get(f"{CONDITIONS}.{x}_factor", 1.0) for x in ("static", "coulomb"))
-    return (static >= coulomb) | (flat["friction.static"] < flat["friction.coulomb"])  # the latter is told by the law
+    # the law itself reports the second case
+    return (static >= coulomb) | (flat["friction.static"] < flat["friction.coulomb"])
 
 
 class Conditions(UncertainSection):

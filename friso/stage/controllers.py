@@ -25,12 +25,11 @@ OF_ANY_FORM = ("kind", "force_limit", "anti_windup", "anti_windup_time", "filter
 """Keys of a controller that are unchanged when it is put into another form."""
 
 AntiWindup = Literal["none", "clamp", "back_calculation"]
-"""Behaviour of integrators while the force is at its limit.
-
-They continue to wind up; stop where they would drive the force further; or unwind in proportion to the excess force."""
+"""What integrators do while the force is at its limit: they continue to wind up; stop where they would drive the force
+further; or unwind in proportion to the excess force."""
 
 DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
-"""Anti-windup of a stage file that has a limit and does not say."""
+"""Anti-windup of a stage file that has a force limit but names no anti-windup."""
 
 BACK_CALCULATION: AntiWindup = "back_calculation"
 
@@ -51,8 +50,8 @@ class ControllerSection(AgainstFriction):
     """Base of the controllers.
 
     Each declares its keys, `kind: Literal["name"]`, its blocks, and everything else that friso asks of a controller; no
-    other module reads its keys. A kind may have several forms, distinguished by their keys, which derive from the class
-    that declares the kind.
+    other module reads its keys. A kind may have several forms, which are distinguished by their keys and derive from
+    the class that declares the kind.
     """
 
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
@@ -67,10 +66,8 @@ class ControllerSection(AgainstFriction):
     bandwidth_name: ClassVar[str] = "crossover"
     """Name of the bandwidth key in a sentence."""
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({})
-    """Exponents by key, for a controller that becomes faster by a factor.
-
-    Each key is multiplied by the factor to the power of its exponent; all poles and zeros are then multiplied by the
-    factor."""
+    """Exponents by key, for a controller that becomes faster by a factor. Each key is multiplied by the factor to the
+    power of its exponent, which multiplies all poles and zeros by the factor."""
     shaped_by: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     """Tuning ranges of the keys that shape a controller without making it faster."""
     loop_gain: ClassVar[tuple[str, ...]] = ()
@@ -78,18 +75,15 @@ class ControllerSection(AgainstFriction):
     decisive: ClassVar[tuple[str, ...]] = ()
     """Names of the numeric keys on which `variant` and `integrates` depend, for example by being zero."""
     recognised_by: ClassVar[tuple[str, ...]] = ()
-    """Names of the keys that identify this form among others of its kind.
-
-    One of them in a table is enough; a form without any is the default."""
+    """Names of the keys that identify this form among others of its kind. One of them in a table is enough; a form
+    without such keys is the default."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Labels in plots of the terms of the force."""
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Names of keys on the axes of maps, where the key itself is not clear enough."""
     usual: ClassVar[Mapping[str, tuple[float, float, str, tuple[str, ...]]]] = MappingProxyType({})
-    """Usual values of keys in positioning stages.
-
-    For each key: the ends of the range, their unit, and the units in which values are reported. Gains are per kilogram
-    of moving mass."""
+    """Usual values of keys in positioning stages. For each key: the two ends of its range, their unit, and the units in
+    which values are reported. Gains are per kilogram of moving mass."""
     symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
     """Names and symbols of keys in a table of gains, where the key itself is not clear enough."""
 
@@ -152,8 +146,8 @@ class ControllerSection(AgainstFriction):
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
         """Return other structures of the controller for `friso tune` to try, by their names.
 
-        Each holds the keys of the stage file that change: numbers [SI] as floats, texts, None for keys that go. It is
-        empty if a controller declares none.
+        Each has the keys of the stage file that change: numbers [SI] as floats, texts, or None for keys to remove. A
+        controller may declare none.
         """
         return {}
 
@@ -196,7 +190,7 @@ class ControllerSection(AgainstFriction):
 
 
 class Controllers(Variants):
-    """The registered controllers: kinds, each of one form or of several that are distinguished by their keys."""
+    """Registry of controllers: their kinds, each with one form or several, distinguished by their keys."""
 
     def __init__(self) -> None:
         super().__init__("kind", "friso.controllers")
@@ -261,7 +255,7 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return a controller's keys that depend on other keys of the stage, at their present values.
 
-    The controller is tuned once, for the machine of the stage file.
+    They then stay as tuned for the machine of the stage file, if the machine changes.
     """
     controller = controller_of(flat)
     of_file = {*map(controller.key, numeric_fields(controller))}

@@ -1,8 +1,8 @@
-"""Correlations of the uncertain keys of a stage, in a file next to it; and stages drawn from them.
+"""Read and write correlations of a stage's uncertain keys, and draw stages from them.
 
-`identified.correlations.toml` stands beside `identified.toml` and holds `keys` and their correlation `matrix`:
-that of the normal distributions behind the keys (a normal copula, Nelsen 2006, An Introduction to Copulas, Sec. 2.8).
-For two keys "VALUE +/- HALF-WIDTH" it is their own correlation. Keys that it does not name are independent.
+`identified.correlations.toml` stands beside `identified.toml` and holds `keys` and their correlation `matrix`: that of
+the normal distributions behind the keys (a normal copula, Nelsen 2006, An Introduction to Copulas, Sec. 2.8). For two
+keys "VALUE +/- HALF-WIDTH" it is their own correlation. Keys that it does not name are independent.
 """
 
 from __future__ import annotations
@@ -28,9 +28,8 @@ _EXPECTED = "a file with keys and the matrix of their correlations"
 _EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'
 
 ROUNDING = 1e-9
-"""Tolerance for rounded numbers of a matrix.
-
-It bounds asymmetry, deviation of the diagonal from 1, and negative eigenvalues."""
+"""Tolerance for rounded numbers of a matrix: it bounds asymmetry, deviation of the diagonal from 1, and negative
+eigenvalues."""
 
 MOST = 100
 """Largest number of draws per stage before the ranges are reported to allow hardly any."""
@@ -40,7 +39,7 @@ MOST = 100
 class Correlations:
     """Keys of a stage file and their correlation matrix, shape (keys, keys).
 
-    Without any, all keys are independent. Raises StageError if the matrix is not one of correlations.
+    An empty object stands for independent keys. Raises StageError if the matrix is no correlation matrix.
     """
 
     keys: tuple[str, ...] = ()
@@ -132,7 +131,7 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
-    """Raise StageError for a key that the stage lacks, or that is not uncertain in it."""
+    """Raise StageError for a key that the stage lacks, or that is not uncertain."""
     keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:
@@ -148,8 +147,8 @@ def _belongs(correlations: Correlations, stage: Stage) -> None:
 class Sample:
     """Stages drawn at random: dotted keys to SI arrays, shape (count,).
 
-    Some draws were replaced. `beyond` counts those in which a key exceeded its bound. `broken` counts those that broke
-    a rule between keys, by the rule.
+    Invalid draws were replaced. `beyond` counts draws in which a key exceeded its bound. `broken` counts draws that
+    broke a rule between keys, by the rule.
     """
 
     keys: Mapping[str, np.ndarray]
@@ -205,7 +204,7 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
     sizes, directions = np.linalg.eigh(matrix)
     root = directions * np.sqrt(np.maximum(sizes, 0.0))
-    edge = 2.0**-31  # half the step of the sequence: its 0 would be infinitely far out
+    edge = 2.0**-31  # half the step of the sequence: a 0 would be infinitely far out
     normals = ndtri(np.clip(shares, edge, 1 - edge)) @ root.T
     flat, values = stage.flat(), {}
     for (key, interval), column in zip(stage.uncertain().items(), normals.T, strict=True):

@@ -33,7 +33,7 @@ _HINTS = {
     ".tdms": "friso logs {}",
     ".zarr": "friso map {}",
 }
-"""Hint for files that are not stage files, by suffix: the command that reads them."""
+"""The command that reads a file that is no stage file, by the file's suffix."""
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -58,7 +58,7 @@ def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """Read a stage file; for a file of another kind, the error names the command for it.
+    """Read a stage file; for another kind of file, the error names the command that reads it.
 
     Raises StageError.
     """
@@ -113,7 +113,7 @@ def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
 
 
 def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return tables in which a `file` beside the stage file has its whole path."""
+    """Return tables in which a `file` beside the stage file has its full path."""
     whole: dict[str, Any] = dict(tables)
     for name, table in tables.items():
         if folder is not None and isinstance(table, dict) and isinstance(table.get("file"), str):
@@ -145,7 +145,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
         raise InputError("path", *why, 'path="stage.toml"')
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
-    place = Path(os.path.realpath(place))  # a link stays one
+    place = Path(os.path.realpath(place))  # write through a link, so that the link stays
     try:
         if place.exists():
             check_free(place)
@@ -173,7 +173,7 @@ def parse_set(text: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """Return a TOML value, or the text itself if it is none.
+    """Return a TOML value, or the text itself if it is no TOML value.
 
     An inline table holds neither comments nor a second line.
     """
@@ -190,8 +190,8 @@ def _value(text: str) -> Any:
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
     """Read a text file that should be `expected`.
 
-    With `latin` it may be Latin-1, as older programs write it. Raises InputError, also for a device, for a pipe and
-    for more than MOST_BYTES.
+    With `latin` it may be Latin-1, as older programs write it. Raises InputError, also for a device, a pipe, or more
+    than MOST_BYTES.
     """
     try:
         content = content_of(path, MOST_BYTES)
@@ -200,7 +200,7 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = Fa
         most = f"of at most {MOST_BYTES / 1e6:g} MB"
         raise InputError("", str(error), f"{expected}, {most}", example, str(path)) from None
     except UnicodeDecodeError as error:
-        is_wide = error.object[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # as PowerShell 5 writes with >
+        is_wide = error.object[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # written by > in PowerShell 5
         text = "UTF-16" if is_wide else f"byte {error.start + 1} is not UTF-8"
         raise InputError("", text, "a text file saved as UTF-8", example, str(path)) from None
     except (OSError, ValueError) as error:
@@ -225,7 +225,10 @@ def _reason(error: OSError | ValueError) -> str:
 
 
 def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
-    """Return the tables of a TOML text that is to be what is `expected`. Raises InputError."""
+    """Return the tables of a TOML text.
+
+    `expected` says in errors what the text should be. Raises InputError.
+    """
     if not text.strip():
         raise InputError("", "an empty file", expected, example)
     if key := _MANY_PARTS.search(text):
@@ -242,21 +245,18 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         actual = f"not TOML: {_syntax_error(text, str(error))}"
         raise InputError("", actual, "tables in brackets, then key = value", example) from None
-    except ValueError:  # Python's own
+    except ValueError:  # raised by Python itself
         raise InputError("", "not TOML: a whole number of thousands of digits", expected, example) from None
 
 
 _PARTS = 32
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
-"""Pattern of keys with more parts than any table has.
-
-Thousands of parts would take a time that grows with the square of their number."""
+"""Pattern of keys with more parts than any table has. With thousands of parts, reading would take a time that grows
+with the square of their number."""
 
 _TABLE = re.compile(rf"^[ \t]*\[\[?[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART})*[ \t]*\](?!.*,[ \t]*$)", re.MULTILINE)
-"""Pattern of the heading of a table.
-
-A row of an array differs in that it ends with a comma."""
+"""Pattern of the heading of a table. A row of an array looks alike, but ends with a comma."""
 
 MOST_TABLES, MOST_LINES = 1000, 20_000
 """Largest number of tables, and of lines, of a text.
@@ -278,7 +278,7 @@ def _syntax_error(text: str, message: str) -> str:
         return message
     number, column = int(place[1]), int(place[2])
     line = text.split("\n")[number - 1].rstrip("\r")
-    why = re.sub(r"\('(.*)',\)", r"\1", message[: place.start()])  # the parts of a key, of which there is one
+    why = re.sub(r"\('(.*)',\)", r"\1", message[: place.start()])  # a key in the message is a tuple with one part
     if (opened := _open_quote(line)) is not None:
         column, why = opened + 1, "a quote that is not closed"
     elif line[column - 1 : column] in _TYPOGRAPHIC:

@@ -20,10 +20,8 @@ MOST = 12
 """Largest number of filters of a controller."""
 
 FilterRule = Literal["bilinear", "prewarped", "backward_euler"]
-"""Rule by which a drive discretises a filter.
-
-They are the bilinear transform (Tustin), the bilinear transform prewarped to be exact at the frequency of the poles,
-and backward differences."""
+"""Rule by which a drive discretises a filter: the bilinear transform (Tustin), the bilinear transform prewarped to be
+exact at the frequency of the poles, or backward differences."""
 
 Polynomial = tuple[Any, Any, Any]
 """Coefficients of 1, s [s] and s^2 [s^2]."""
@@ -220,7 +218,7 @@ class FilterForm(NamedTuple):
 
     @property
     def section(self) -> type[FilterSection]:
-        """Return the class that declares its transfer function."""
+        """Return the class that declares the filter's transfer function."""
         return FILTERS.classes[self.kind]  # type: ignore[return-value]
 
 

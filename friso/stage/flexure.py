@@ -14,7 +14,7 @@ from friso.stage.plug_ins import load_own
 from friso.stage.section import Rule, UncertainSection, nearest_name
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
-"""Flat keys that follow from others, from the flat SI mapping; arrays allowed."""
+"""Function that computes keys that follow from others, from the flat SI mapping; arrays are allowed."""
 
 DERIVATIONS: dict[str, Derivation] = {}
 """Derivations by table: each computes the keys that follow from a table."""

@@ -1,5 +1,4 @@
-"""List the controllers and friction laws that are not friso's own,
-for `friso --help` and every report."""
+"""List controllers and friction laws from outside friso, for `friso --help` and every report."""
 
 from friso.stage.controllers import CONTROLLERS
 from friso.stage.plug_ins import load_installed, plug_in_of

@@ -1,8 +1,8 @@
 """Define keys that take an array: of values, or of tables.
 
 Examples are `element_stiffness = ["40 N/um", "30 N/um"]` and `[[controller.filters]]`. In `Stage.flat` every element
-has a key of its own, numbered from 1, such as friction.element_stiffness.2. A table in an array has one for each of its
-keys, such as controller.filters.2.frequency.
+has a key of its own, numbered from 1, such as friction.element_stiffness.2. A table in an array has such a key for each
+of its own keys, such as controller.filters.2.frequency.
 """
 
 from collections.abc import Callable, Mapping
@@ -99,7 +99,7 @@ class Several:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """A key that takes an array of numbers that are only varied together.
+    """A key that takes an array of numbers that are varied only together.
 
     `roots` may be complex, written as texts.
     """

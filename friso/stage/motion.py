@@ -1,4 +1,7 @@
-"""[motion]: what the reference does. Each kind is one file in `friso/equations/motions/`, or comes from a package."""
+"""Declare what every motion of the reference has: the table [motion].
+
+Each kind of motion is one file in `friso/equations/motions/`, or comes from a package.
+"""
 
 from __future__ import annotations
 
@@ -23,21 +26,16 @@ class ReferenceForm(NamedTuple):
 
     @property
     def inputs(self) -> int:
-        """Return how many numbers describe a piece.
-
-        They are derivatives, the direction, and four for each sinusoid.
-        """
+        """Return how many numbers describe a piece: derivatives, direction, and four for each sinusoid."""
         return 1 + self.degree + (1 + 4 * self.tones if self.tones else 0)
 
 
 QUADRATIC = ReferenceForm()
-"""Form of a reference of parabolic pieces.
-
-It fits any motion with bounded acceleration, and a reference that stands."""
+"""Form of a reference of parabolic pieces. It fits any motion with bounded acceleration, and a reference at rest."""
 
 
 class Tone(NamedTuple):
-    """A sinusoid: amplitude [m], initial phase [turns] and frequency [Hz], and its rise [Hz/s]."""
+    """A sinusoid: amplitude [m], initial phase [turns], frequency [Hz], and rise of frequency [Hz/s]."""
 
     amplitude: Any
     turns: Any
@@ -69,9 +67,8 @@ class Lowered(NamedTuple):
 
 
 Piece = tuple[Any, ...]
-"""Start time [s], and position [m], velocity [m/s] and acceleration [m/s^2] there.
-
-Jerk and snap follow as far as needed."""
+"""Start time [s] of a piece, and position [m], velocity [m/s] and acceleration [m/s^2] there. Jerk and snap follow if
+the reference has them."""
 
 
 class Motion(UncertainSection):
@@ -144,7 +141,7 @@ class Motion(UncertainSection):
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
         """Return ranges of two keys for moves around the present one; none if there is no move.
 
-        `shares` gives both ends, as factors.
+        `shares` gives the two ends of both ranges, as factors on the present values.
         """
         return {}
 

@@ -18,9 +18,8 @@ GRAVITY = 9.81
 """Acceleration of gravity [m/s^2]."""
 
 STRONGEST = 30.0
-"""Largest plausible friction of a contact bearing, in weights of its load.
-
-Preload may exceed the weight, but not by so much."""
+"""Largest plausible friction of a contact bearing, in units of the load's weight. Preload may exceed the weight, but
+not by that much."""
 
 
 PRESLIDING = (1e-10, 1e-2)
@@ -95,8 +94,8 @@ def idle_encoder(stage: Stage) -> Iterator[str]:
 def implausible_values(stage: Stage) -> Iterator[str]:
     """Yield a sentence on each implausible value, with the unit that was probably meant.
 
-    Friction and gains are judged by the mass: if a mass in another unit would make several of them usual, the mass is
-    named instead.
+    Friction and gains are judged relative to the mass. If another unit of a mass would make several of them usual, the
+    sentence names the mass instead.
     """
     flat = stage.flat()
     complaints = _complaints(stage, flat)
@@ -135,7 +134,7 @@ def _judged(stage: Stage, flat: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if stage.controller:
         mass = moving_mass(flat)
         for name, (low, high, unit, units) in stage.controller.usual.items():
-            times = mass if "N" in unit else 1.0  # gains follow the mass
+            times = mass if "N" in unit else 1.0  # usual gains grow with the mass
             if stage.axis_kind == ROTARY and "N" in unit:
                 continue
             usual_values[stage.controller.key(name)] = _Usual(times * low, times * high, unit, units)
@@ -145,7 +144,7 @@ def _judged(stage: Stage, flat: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         value = flat.get(key)
         if value and not usual.low <= value <= usual.high:
             if not (written := _written(stage, key)) and key == MOTOR_MASS:
-                continue  # its inertia is judged
+                continue  # the motor's inertia is judged instead
             written = written or f"{value:.6g} {usual.unit}"
             yield key, f"{key} = {written} is unusual for a positioning stage{_question(written, usual)}"
 
@@ -166,7 +165,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
             (f"{table}.static", f"{table}.coulomb"), _Usual(1e-6, most, "N", ("N", "mN", "uN", "kN"))
         )
         force = flat.get(f"{table}.static", 0.0)
-        force = force if force <= most else 0.0  # which is questioned alone
+        force = force if force <= most else 0.0  # such a force is questioned on its own
         usual[f"{table}.bristle_stiffness"] = _presliding(force)
         for key in element_keys(flat, f"{table}.element_stiffness"):
             share = flat.get(key.replace("element_stiffness", "element_share"), 1.0)
@@ -200,7 +199,7 @@ def _question(written: str, usual: _Usual) -> str:
         factor = Quantity(usual.unit, any_sign, "").factor(other)
         try:
             fits = usual.low <= float(number) * factor <= usual.high
-        except ValueError:  # an interval
+        except ValueError:  # the text is an interval
             return ""
         if fits and other != unit.strip():
             return f": was {other} meant?"

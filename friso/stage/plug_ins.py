@@ -79,9 +79,8 @@ FRISO = {
     "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
     "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
 }
-"""Modules that register friso's own sections, by group.
-
-They belong to higher layers, and are imported when a stage is first read."""
+"""Modules that register friso's own sections, by group. They belong to higher layers, and are imported when a stage is
+first read."""
 
 
 def load_own(group: str) -> None:

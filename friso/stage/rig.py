@@ -1,4 +1,4 @@
-"""The tables of a stage file that describe the drive as built and what surrounds the machine."""
+"""Declare the tables of a stage file for the real drive and the machine's surroundings."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -31,21 +31,21 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 
 
 AS_BUILT = ("drive", "rail", "cable", "floor")
-"""Tables of the machine as built, which analyses of the ideal machine omit."""
+"""Tables of the real drive and its surroundings, which analyses of the ideal machine leave out."""
 
 CONVERSIONS = frozenset({"machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn"})
-"""Keys of [drive] that only convert units, and do not make it a drive as built."""
+"""Keys of [drive] that only convert units, and so do not describe the real drive."""
 
 
 def is_as_built(stage: Any) -> bool:
-    """Tell whether a stage describes its drive as built, such as its samples, or its surroundings."""
+    """Tell whether a stage describes its real drive, such as its sampling, or its surroundings."""
     if any(getattr(stage, table) for table in AS_BUILT[1:]) or getattr(stage.controller, "sample_time", None):
         return True
     return stage.drive is not None and bool({*stage.drive.as_written()} - CONVERSIONS)
 
 
 def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
-    """Say which of the `tables` an analysis of the ideal machine omits; empty if the stage has none of them."""
+    """Say which of the `tables` an analysis of the ideal machine leaves out; "" if the stage has none."""
     placed = stage.conditions is not None and stage.conditions.place is not None
     left = [name for name in tables if getattr(stage, name) and not (name == "rail" and placed)]
     if not left:
@@ -56,9 +56,8 @@ def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
 
 
 IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]
-"""Rule by which a drive integrates.
-
-It is the trapezoidal rule, or a sum that ends with the present sample (backward) or with the one before (forward)."""
+"""Rule by which a drive integrates: the trapezoidal rule, or a sum that includes the present sample (backward) or ends
+with the one before (forward)."""
 
 LOOPS = ("velocity", "position")
 """Loops that may have their own sample time, drive.<loop>_sample_time."""
@@ -237,7 +236,10 @@ _PER_ROOT_HERTZ = re.compile(r"\s*/\s*(Hz(\^|\*\*)0\.5|sqrt\(Hz\)|√Hz)\s*$")
 
 @dataclass(frozen=True)
 class Density(Quantity):
-    """A key that takes an amplitude spectral density; `unit` is what the text of a value has before "/Hz^0.5"."""
+    """A key that takes an amplitude spectral density.
+
+    `unit` is what stands before "/Hz^0.5" in the text of a value.
+    """
 
     @property
     def expected(self) -> str:

@@ -1,4 +1,4 @@
-"""Base of all tables of a stage file: strict keys, readable errors, rules, and variants."""
+"""Define the base of all tables of a stage file: strict keys, readable errors, rules, and variants."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
@@ -36,7 +36,7 @@ class Rule:
     example: str
 
     def at(self, place: str) -> "Rule":
-        """Return the rule for the keys of a table at a place of the stage file."""
+        """Return the rule with its keys moved to a table at `place` in the stage file."""
         keys = tuple(f"{place}.{key}" for key in self.keys)
         return Rule(keys, lambda flat: self.holds(keys_below(flat, place)), self.expected, self.example)
 
@@ -47,13 +47,15 @@ def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
 
 
 MOST_KEYS = 100
-"""Largest number of keys of a table, unknown ones included.
-
-The nearest known key is looked for to each unknown one."""
+"""Largest number of keys of a table, unknown ones included, because the nearest known key is searched for each unknown
+one."""
 
 
 class Section(BaseModel):
-    """A table of a TOML file. Raises its `refusal` when it is made from wrong data."""
+    """A table of a TOML file.
+
+    Wrong data raise the section's `refusal`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -114,8 +116,8 @@ class UncertainSection(Section):
     def numbers(self) -> dict[str, Any]:
         """Return the values by key.
 
-        Values of an array stand under key and number, counted from 1, and values of tables in it under their own keys
-        below that.
+        Values of an array stand under key and number, counted from 1. Values of tables in an array stand under their
+        own keys, after that number.
         """
         values: dict[str, Any] = {}
         for key, value in self:
@@ -135,7 +137,7 @@ class UncertainSection(Section):
 
 
 def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
-    """Return the value of an element, uncertain where its text has a range. Raises InputError."""
+    """Return the value of an array's element, uncertain if its text has a range. Raises InputError."""
     text = getattr(value, "text", value)
     return uncertain_value(text, field) if is_range(text) else field.read(value)
 
@@ -145,7 +147,7 @@ SectionClass = TypeVar("SectionClass", bound=type[Section])
 
 @dataclass(frozen=True)
 class Table:
-    """A key that takes a table: `pick` chooses the section class for it, `example` shows one."""
+    """A key that takes a table: `pick` chooses the section class for the table, `example` shows one."""
 
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
@@ -189,7 +191,7 @@ class Variants:
         """Class decorator: add a variant. Raises InputError where its name is taken."""
         name = self.name_of(cls)
         if plug_in_of(cls):
-            load_own(self.group)  # whose names come first
+            load_own(self.group)  # friso's own names come first
         holder = self._classes.get(name, cls)
         if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
             actual = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
@@ -222,7 +224,7 @@ class Variants:
 
 @dataclass(frozen=True)
 class OneTable:
-    """A table of a single class, in place of variants."""
+    """A table of a single class, used like `Variants`."""
 
     section: type[Section]
 
@@ -294,7 +296,7 @@ def nearest_name(name: Any, names: Iterable[str]) -> str | None:
 
 
 def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
-    """Return the error for a key that does not exist, naming the nearest that does."""
+    """Return the error for a key that does not exist, naming the nearest existing key."""
     near = nearest_name(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
     return InputError(key, hint, f"one of {', '.join(names)}", example)
@@ -325,7 +327,7 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
         return _complete(cause, key)
-    if not problem["loc"]:  # no key has a wrong value: what went wrong is friso's own
+    if not problem["loc"]:  # no key has a wrong value: the mistake is friso's own
         raise cause or ValueError(problem["msg"])
     if problem["type"] == "extra_forbidden":
         near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
@@ -334,15 +336,15 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
 
 
 def _own_first(cls: type[Section]) -> list[str]:
-    """Return the keys of a table: its own first, then those common to several tables."""
+    """Return the keys of a table: its own first, then those that several tables have."""
     declared = (name for base in cls.__mro__ for name in vars(base).get("__annotations__", ()))
     return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
 def _complete(error: InputError, key: str) -> InputError:
-    """Return an error completed with the key below which it occurred.
+    """Return an error completed with the key of the table in which it occurred.
 
-    `key` also precedes an example that is a mere value.
+    `key` is also put before an example that is a mere value.
     """
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
@@ -350,7 +352,7 @@ def _complete(error: InputError, key: str) -> InputError:
 
 
 def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
-    """Return what a key takes, and an example of it."""
+    """Return what a key takes, and an example."""
     field = cls.model_fields[key]
     for item in field.metadata:
         if isinstance(item, Table):

@@ -1,4 +1,4 @@
-"""The stage: all tables together, and the flat SI mapping that the equations read."""
+"""Define the stage: all tables together, and the flat SI mapping that the equations read."""
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping
@@ -155,7 +155,7 @@ class Stage(Section):
     @field_validator("name", "source")
     @classmethod
     def _can_be_saved(cls, text: str) -> str:
-        text.encode()  # raises on half a character, which a command line may contain
+        text.encode()  # raises for half a character, which a command line may contain
         return text
 
     @model_validator(mode="after")
@@ -217,12 +217,12 @@ class Stage(Section):
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
 
     def _has_computable_leaves(self) -> None:
-        """Check that leaf springs have sizes for which stiffness and modes can be computed."""
+        """Check that stiffness and modes can be computed for the sizes of the leaf springs."""
         try:
             flat = self.flat() if self.flexure else {}
         except InputError:  # leaves that buckle, for one: it says why
             raise
-        except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # numbers beyond what floats hold
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # numbers too large for floats
             flat = {"joint.stiffness": np.nan}
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
         undefined = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
@@ -305,7 +305,7 @@ class Stage(Section):
         return changed(self.as_written(), changes)
 
     def in_own_units(self, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return changes typed next to the stage file, completed by its units.
+        """Return changes that were typed beside a stage file, completed by the units of the file.
 
         A bare number gets the unit that the file has for its key; wrong capitals in a unit are corrected.
         """
@@ -318,7 +318,7 @@ class Stage(Section):
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """Return the stage with SI numbers for dotted keys, and without some tables.
 
-        Numbers are written so that they read back as the same. Raises StageError.
+        Numbers are written so that they read back unchanged. Raises StageError.
         """
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
@@ -380,7 +380,7 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:
-    """Return the axis of a stage file's tables, with what an ampere exerts there.
+    """Return the axis of a stage file's tables, with the force or torque per ampere.
 
     Errors in [axis] and [actuator] are found later.
     """
@@ -391,7 +391,7 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
     try:
         constant = MOTOR_CONSTANT.on(kind).read(_of_table(tables, "actuator", "motor_constant"))
         return replace(kind, per_ampere=float(constant))
-    except InputError:  # the one message is to be about that
+    except InputError:  # a later check reports this error
         return replace(kind, per_ampere=1.0)
 
 
@@ -413,7 +413,7 @@ def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return the keys of a flat stage in their declared units, which are those of a linear axis."""
+    """Return the keys of a flat stage in their declared units, which belong to a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= _numeric_keys_of(flat, name, cls)
@@ -437,9 +437,9 @@ def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tu
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
-    """Return the violated bounds and rules of flat SI values: where, and why.
+    """Return the violated bounds and rules of flat SI values, each as where and why.
 
-    `flat` may hold arrays; where is a boolean or an array.
+    `flat` may hold arrays; `where` is then a boolean array, else a boolean.
     """
     bounds = [
         (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
@@ -472,7 +472,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "transmission": Transmission,
         "encoder": Encoder,
         **({MOTOR_FRICTION: friction_law(flat[_MOTOR_LAW])} if _MOTOR_LAW in flat else {}),
-        "flexure": Flexure,  # before what follows from it: the first mistake is the one reported
+        "flexure": Flexure,  # first, because a mistake here causes later ones
         "joint": Joint,
         "parasitic": Parasitic,
         "bias": Bias,
@@ -546,7 +546,7 @@ def _under(tables: Mapping[str, Any], key: str) -> Any:
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set or (None) remove a dotted key of nested tables, or set an element of an array.
+    """Set a dotted key of nested tables or an element of an array; None removes it.
 
     Raises StageError.
     """

@@ -1,4 +1,4 @@
-"""What drives do against friction, beside any controller: keys of [controller]."""
+"""Declare the keys of [controller] against friction, which drives have beside any controller."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class AxisTable(UncertainSection):
 
 @dataclass(frozen=True)
 class MotorConstant(Quantity):
-    """The key that takes a motor's constant, at the load."""
+    """A key that takes the motor constant, at the load."""
 
     @property
     def expected(self) -> str:
@@ -73,9 +73,8 @@ class FrictionSection(UncertainSection):
     under_conditions: ClassVar[bool] = False
     """Whether [conditions] multiply static and Coulomb friction of the law."""
     decided_by: ClassVar[Mapping[str, str]] = {}
-    """Experiments that would determine keys that other measurements leave open, by key.
-
-    Under "" stands the experiment that distinguishes the law from LuGre."""
+    """Experiments that would determine keys that other measurements leave open, by key. Under the key "" stands the
+    experiment that distinguishes the law from LuGre."""
     fitted: ClassVar[bool] = False
     """Whether `friso identify` fits the law's parameters to logs of moves."""
     words: ClassVar[Mapping[str, str]] = {}
@@ -100,20 +99,19 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def keeping(measured: Any, elements: int) -> dict[str, Any]:
-        """Return keys for which the law reproduces measured friction as closely as it can [SI].
+        """Return keys [SI] with which the law reproduces measured friction as closely as it can.
 
         Laws with several elements have `elements` in parallel.
         """
         return {}
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
-    """Parameters that a fit determines besides steady friction, and stiffness and damping before sliding.
-
-    For each: lower bound, initial value, upper bound; all are greater than 0."""
+    """Parameters that a fit determines besides steady friction, and stiffness and damping before sliding. For each:
+    lower bound, initial value, upper bound; all are greater than 0."""
 
     @staticmethod
     def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys with measured steady friction, stiffness and damping, and with a `shape` [SI].
+        """Return keys [SI] with measured steady friction, stiffness and damping, and with a `shape`.
 
         A law that declares `shape` can be fitted (`friso.identification.laws`).
         """
@@ -145,7 +143,7 @@ def friction_law(name: str) -> type[FrictionSection]:
 def passive_where(flat: Mapping[str, Any]) -> str:
     """Return the condition of passivity that a stage's friction law violates.
 
-    It is in the units of its axis; "" if the law is passive, or declares none.
+    It is given in the units of the stage's axis; "" if the law is passive, or declares no condition.
     """
     return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
@@ -194,7 +192,7 @@ class Bias(UncertainSection):
 
 
 ROUNDING = 1e-12
-"""Relative slack of limits on times, which are sums of decimal numbers."""
+"""Relative tolerance for limits on times, which are sums of decimal numbers."""
 
 
 class StatedMoves(Section):

@@ -21,7 +21,7 @@ STATE_PREFIX = "motor_"
 """Prefix of the names of states that belong to the motor."""
 
 MOTOR_STATES = ("motor_position", "motor_velocity")
-"""Names of the motor's position and velocity, at the load."""
+"""Names of the motor's position and velocity, converted to the load."""
 
 Side = Literal["motor", "load"]
 """A side of the transmission."""
@@ -68,13 +68,13 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the mass of the motor at the load [kg] from its inertia; None without one."""
+    """Return the motor's mass converted to the load [kg], from its inertia; None without an inertia."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the flat keys with the motor's friction under [friction], if the guide has none."""
+    """Return the flat keys with the motor's friction under [friction], if the guide has no friction."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 
@@ -87,7 +87,7 @@ def moving_mass(flat: Mapping[str, Any]) -> Any:
 def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the flat keys with the motor's friction under [friction], and without [conditions].
 
-    The conditions hold for the guide, whose friction is left out.
+    The conditions belong to the guide, whose friction is left out.
     """
     kept = {key: value for key, value in flat.items() if not key.startswith(("friction.", f"{CONDITIONS}."))}
     return {**kept, "friction.model": "none", **as_friction(flat)}

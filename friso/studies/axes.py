@@ -28,7 +28,7 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 
 @dataclass(frozen=True)
 class SweptAxis:
-    """An axis of a study: a swept key, a scaling, or a free variable that links use.
+    """Axis of a study: a swept key, a scaling, or a free variable that links use.
 
     It has SI values (or words and booleans), their unit, and their scale.
     """
@@ -89,8 +89,8 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 class _Reader:
     """Reader of the numbers of an axis, of any sign.
 
-    A value that no stage may have makes its cells invalid, not the axis. A free variable (`field` None) takes the SI
-    unit of the first key of that kind.
+    A value that no stage may have makes only its cells invalid, not the whole axis. A free variable (`field` None)
+    takes the SI unit of the first value's kind of quantity.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:
@@ -102,7 +102,7 @@ class _Reader:
         return "" if self.field is None else self.field.unit
 
     def text(self, entry: Any) -> float:
-        """Return the SI value of a text such as "8 Hz" or, without unit, "0.1"."""
+        """Return the SI value of a text such as "8 Hz", or of "0.1" for a number without unit."""
         entry = entry.strip() if isinstance(entry, str) else entry
         bare = _number(entry)
         if self.field is None:
@@ -185,7 +185,7 @@ def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis
 
 
 def _items(values: Any) -> list[Any]:
-    """Return the values of a list. Raises InputError for anything else."""
+    """Return the values of a list. Raises InputError for a value that is no list."""
     try:
         return list(values)
     except TypeError:

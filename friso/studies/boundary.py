@@ -26,14 +26,14 @@ def boundary(
     begins: Callable[[], None] = lambda: None,
     progress: Progress = silent,
 ) -> Diagram | Plane:
-    """Return where the hunting cycle of a stage stops attracting, over one key or two.
+    """Return where the hunting cycle of a stage loses stability, over one key or two.
 
-    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``, logarithmic if ":log" is behind or with
-    `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
-    `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
-    `Plane`: the curves on which they do. The motion of the stage file plays no part. `begins` is called once nothing of
-    the input is wrong, `progress` as cycles are followed. Raises InputError for a wrong range, link, tolerance or stage
-    (one that cannot hunt).
+    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``; a range is logarithmic with ":log" behind
+    it, or with `log`. `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is
+    a `Diagram`: all branches of cycles over the range, and the points at which they flip or fold. With two it is a
+    `Plane`: the curves on which cycles flip or fold. The motion of the stage file plays no part. `begins` is called
+    once the input has been checked, `progress` as cycles are followed. Raises InputError for a wrong range, link,
+    tolerance or stage (one that cannot hunt).
     """
     settings = StudySettings.current()
     checked_rtol(rtol)
@@ -62,7 +62,7 @@ def boundary(
 
 
 def _refuse_impossible(space: Space, example: str) -> None:
-    """Raise InputError if no stage may have the values of the ranges."""
+    """Raise InputError if the ranges contain no valid stage."""
     settings = StudySettings.current()
     points = space.grid(settings.tried_values)
     if not space.allowed(points).any():

@@ -1,4 +1,7 @@
-"""Convert boundaries of hunting to numbers: branches and curves point by point, and verdicts at stages in between."""
+"""Convert boundaries of hunting to numbers.
+
+They are branches and curves point by point, and verdicts at stages in between.
+"""
 
 from __future__ import annotations
 
@@ -11,20 +14,21 @@ import numpy as np
 from friso.hunting import CLOSED, END_OF_RANGE, Branch, Curve, Cycles, Diagram, LocatedPoint, Meeting, Plane, Space
 
 CycleShape = Literal["symmetric", "asymmetric", "whole"]
-"""Kind of a cycle: symmetric, its own mirror image; asymmetric, of a symmetric stage; whole, of a stage that is not
-symmetric."""
+"""Kind of a cycle: symmetric (its own mirror image), asymmetric (of a symmetric stage), or whole (of a stage that is
+not symmetric)."""
 
 ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
-"""Verdicts of a boundary, by all simulations from many starts. The last two stand for failed or unsettled simulations,
-and for invalid stages."""
+"""Verdicts on the stages of a boundary, from simulations and followed branches. The last two mark stages whose
+simulations failed or did not settle, and invalid stages."""
 
 
 @dataclass(frozen=True)
 class Line:
     """A branch of cycles over one key, or a curve in two: its n points in order.
 
-    `at` [SI], shape (n, keys), and its possible `error` (NaN except at special points); `kinds` of the special points
-    ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,); and how the line ends on either side.
+    `at` [SI], shape (n, keys), has the values of the keys, and `error` their error (NaN except at special points).
+    `kinds` are the kinds of special points ("" for ordinary ones). `amplitude` [m], `period` [s] and `multiplier` have
+    the shape (n,). `ends` tells how the line ends on either side.
     """
 
     shape: CycleShape
@@ -53,7 +57,7 @@ class Line:
 
 
 class _Row(NamedTuple):
-    """A point of a line: its place in the box of the keys, its error, its cycle and its kind."""
+    """Point of a line: its place in the box of the keys, its error, its cycle and its kind."""
 
     at: np.ndarray
     error: np.ndarray
@@ -76,7 +80,7 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     """Return the points of a branch and its special points inside the range, in order.
 
-    Points within the error of a special point are left out, because their stability is not known.
+    Points within the error of a special point are left out, because it is unknown whether they are stable.
     """
     path = np.array([point.vector for point in branch.points])
     ordinary = [
@@ -95,7 +99,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
-    """Return the position of a point along a path, in legs."""
+    """Return where along a path a point lies, in legs from its start."""
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
     return leg + before[leg] / (before[leg] + after[leg])
@@ -124,7 +128,7 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 def place_verdicts(result: Diagram) -> list[str]:
     """Return the verdicts at stages spaced evenly over the range.
 
-    They are by simulations and by all branches that reach them.
+    They come from simulations, and from all branches that reach the stages.
     """
     verdicts = _verdicts(result)
     return [
@@ -140,10 +144,10 @@ def end_verdicts(result: Diagram) -> tuple[str, str]:
 
 
 class StabilityChange(NamedTuple):
-    """A change between stages that hunt and stages that do not.
+    """Change between stages that hunt and stages that do not.
 
-    `begins` tells whether hunting begins there as the key rises. It lies between the two values [SI], which are equal
-    if a followed cycle gains or loses stability there.
+    `begins` tells whether hunting begins there as the key rises. The change lies between the two values [SI], which are
+    equal if a followed cycle gains or loses stability there.
     """
 
     begins: bool
@@ -155,7 +159,7 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return where hunting begins and ends over the range, in order.
 
     Verdicts within the error of a special point do not locate a change, because unstable cycles are so weak there that
-    runs may stay on them. They do show that there is hunting between stages that do not hunt.
+    runs may stay on them. But they do show hunting between stages that do not hunt.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
@@ -178,7 +182,10 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
 
 
 def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
-    """Return the values [SI] at which a followed cycle gains (true) or loses stability as the key rises."""
+    """Return the values [SI] at which a followed cycle changes its stability.
+
+    Each comes with True if the cycle gains stability as the key rises, False if it loses stability.
+    """
     return sorted(
         (float(line.at[k, 0]), begins)
         for line in lines(result)
@@ -232,7 +239,7 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 class PlaneEdge(NamedTuple):
-    """Edge of hunting along one key, for the tried values of the other key [SI].
+    """Edge of hunting along one key, for each value tried of the other key [SI].
 
     `along` is the number of the first key, and `across` (n,) are the values of the other one, ascending. `below` tells
     whether hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,), which are equal if a
@@ -259,7 +266,7 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
     attracts = np.reshape([verdict == ATTRACTS for _, _, verdict in nodes], shape)
     values = [np.reshape([node[k] for node in nodes], shape) for k in (0, 1)]
     for along in (0, 1):
-        rows = np.moveaxis(attracts, along, 1)  # of each value of the other key, along this one
+        rows = np.moveaxis(attracts, along, 1)  # one row per value of the other key
         changes = np.diff(rows.astype(int), axis=1)
         below = bool(rows[0, 0])
         if np.all(np.abs(changes).sum(axis=1) == 1) and np.all(rows[:, 0] == below):
@@ -287,7 +294,7 @@ def _crossings(result: Plane, along: int, value: float) -> list[float]:
 
 
 EndKind = Literal["range", "closed", "meets", "lost"]
-"""Ends of a curve: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
+"""How a curve ends: at the end of the range, as a ring, on another curve, or where its cycle was lost."""
 
 
 class CurveEnd(NamedTuple):
@@ -312,7 +319,7 @@ def curve_ends(result: Plane) -> list[CurveEnd]:
 
 
 def curve_meetings(result: Plane) -> list[Meeting]:
-    """List where curves of a plane meet, their places and errors as values of the keys [SI]."""
+    """Return where curves of a plane meet: places and errors as values of the keys [SI]."""
     meetings = []
     for meeting in result.meetings:
         places = _values(result.space, meeting.places)
@@ -322,7 +329,7 @@ def curve_meetings(result: Plane) -> list[Meeting]:
 
 
 def lost_places(result: Plane) -> np.ndarray:
-    """Return places [SI] with a change at which no curve could be begun, shape (places, 2)."""
+    """Return the places [SI] where a change was seen but no curve could be begun, shape (places, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 

@@ -1,4 +1,4 @@
-"""Run cells with the drive as built, in the machine's surroundings."""
+"""Run cells with the real drive in the machine's surroundings."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ TIMING = tuple(
     f"drive.{name}"
     for name in ("sample_time", "delay", "velocity_samples", "velocity_sample_time", "position_sample_time")
 )
-"""Keys on which the equations of a drive depend through whole numbers of samples."""
+"""Keys that change a drive's equations through whole numbers of samples."""
 
 
 def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:
-    """Tell whether cells run with the drive as built: if only metrics of runs are requested.
+    """Tell whether cells run with the real drive: if only metrics of runs are requested.
 
-    Verdicts, and the runs they use, are of the ideal machine.
+    Verdicts, and the runs that they need, are those of the ideal machine.
     """
     return is_as_built(stage) and of_runs_alone(names)
 
@@ -43,10 +43,11 @@ def of_runs_alone(names: Sequence[str]) -> bool:
 def built_runs(
     stage: Stage, flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None
 ) -> Iterator[tuple[Runs, Measures]]:
-    """Run cells of one structure as built, and measure them.
+    """Run cells of one structure with their real drive, and measure them.
 
     `flat` has flat keys to SI numbers or arrays (count,). All cells have equal noise. The runs have statistics and
-    statuses; turning points are those of the samples, in the measures. Once `cancel` is set, no further chunk begins.
+    statuses; turning points are taken from the samples, and are in the measures. Once `cancel` is set, no further chunk
+    begins.
     """
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
     kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)

@@ -1,4 +1,7 @@
-"""Run cells, stages that differ in some keys: from columns of values to columns of measures."""
+"""Run cells: stages that differ in some keys.
+
+Columns of values become columns of measures.
+"""
 
 from __future__ import annotations
 
@@ -54,11 +57,11 @@ def run_cells(
 ) -> Columns:
     """Run one stage per entry of the columns, shape (cells,) each.
 
-    Columns are axis names to SI values, words or booleans. The drive runs as built if only metrics of runs are named
-    and the file describes the drive (`friso.studies.built_runs`). The result holds the usual metrics of a run and
-    those named (`friso.studies.metric`), each of shape (cells,). A cell that no stage may have has the word "invalid"
-    and the reason in its status; a cell whose run was not completed has the outcome "failed". Setting cancel[0] from
-    another thread ends the work early: cells not run by then keep the outcome "".
+    Columns are axis names to SI values, words or booleans. If only metrics of runs are named and the file describes the
+    drive, cells run with the real drive (`friso.studies.built_runs`). The result holds the usual metrics of a run and
+    the named ones (`friso.studies.metric`), each of shape (cells,). An invalid cell has the word "invalid", and the
+    reason in its status; a cell whose run was not completed has the outcome "failed". Setting cancel[0] from another
+    thread ends the work early: cells not run by then keep the outcome "".
     """
     table = _Table(len(next(iter(columns.values()))), in_order((*usual_metrics(), *names)))
     parts = list(by_words(stage, links, columns))
@@ -95,7 +98,7 @@ def ideal_runs(
 
 
 Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
-"""Flat SI form and numbers of cells, grouped by their words and booleans."""
+"""Flat SI form of cells, and their numbers, for each combination of words and booleans."""
 
 
 def cell_attractors(
@@ -108,7 +111,7 @@ def cell_attractors(
     """Yield the attractors of the chosen cells, grouped by equations.
 
     `chosen` has the shape (cells,). Each part has flat SI values, numbers of cells, and their attractors by a function
-    such as `find_attractors`. The motion does not matter: of cells that differ only in it, one is surveyed.
+    such as `find_attractors`. The motion does not matter: of cells that differ only in the motion, one is surveyed.
     """
     for flat, cells, _ in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), find, threads, cancel)
@@ -121,7 +124,10 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """Find the attractors of stages of one structure, once for all that differ in motion only."""
+    """Find the attractors of stages of one structure.
+
+    Stages that differ only in their motion are searched once.
+    """
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
@@ -140,7 +146,10 @@ def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, 
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return the flat SI form of all cells with links, then scalings, for numeric columns only."""
+    """Return the flat SI form of all cells, for numeric columns only.
+
+    Links are applied first, then scalings.
+    """
     numeric = stage.numeric_keys()
     keys = {name: column for name, column in columns.items() if name in numeric}
     keys |= linked(links, stage.flat(keys) | dict(columns)) if links else {}
@@ -181,7 +190,7 @@ def by_words(
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
     """Yield the numbers of the valid cells, grouped by equations.
 
-    Only a few keys determine the structure; cells are grouped by those.
+    Cells are grouped by the few keys that determine the structure.
     """
     decisive = [key for key in decisive_keys(flat) if np.ndim(flat.get(key, 0.0))]
     groups: dict[Structure, list[np.ndarray]] = {}
@@ -200,7 +209,7 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The variables of a study as they are filled, one entry per cell.
+    """The variables of a study while they are filled, one entry per cell.
 
     `settled` [s], shape (count,), is the time from which each run stays within 10 um of its reference.
     """
@@ -240,7 +249,7 @@ class _Table:
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
 
     def write_runs(self, cells: np.ndarray, evidence: RunEvidence) -> None:
-        """Write the status and the metrics of the cells that were run before work was cancelled."""
+        """Write status and metrics of the cells that were run before the work was cancelled."""
         measures, ran = evidence.measures, evidence.runs.results.statuses != Status.NOT_RUN
         columns = {name: metric.compute(evidence) for name, metric in self.of("run").items()}
         for name, column in (columns | {STATUS: _STATUS[measures.status]}).items():

@@ -23,11 +23,11 @@ logger = logging.getLogger("friso")
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[Crew]:
-    """Return a crew made of the workers of a Dask scheduler, "tls://10.0.0.1:8786".
+    """Return a crew made of the workers of a Dask scheduler, such as "tls://10.0.0.1:8786".
 
-    Every thread of a worker computes one block at a time, in that thread alone. Certificates are those of Dask's
-    configuration (distributed.comm.tls). Without TLS, whoever reaches the address can run code: that is logged. Raises
-    InputError if the scheduler does not answer, has no workers, or one with another version of friso.
+    Every thread of a worker computes one block at a time, in that thread alone. Certificates come from Dask's
+    configuration (distributed.comm.tls). Without TLS, anyone who can reach the address can run code; this is logged.
+    Raises InputError if the scheduler does not answer, has no workers, or one with another version of friso.
     """
     settings = StudySettings.current()
     from distributed import Client, KilledWorker
@@ -69,7 +69,7 @@ def run_checked(
 ) -> Columns:
     """Run cells on a worker after checking the version of its friso.
 
-    A worker that joined later was not asked before.
+    A worker that joined later was not checked before.
     """
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())
@@ -77,11 +77,11 @@ def run_checked(
 
 
 def _refuse_strangers(client: Any) -> None:
-    """Raise InputError unless every worker has the friso of this process."""
+    """Raise InputError unless every worker has the same friso as this process."""
     if not client.nthreads():
         raise InputError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
 
-    def version() -> str:  # sent as it is, not by name: an older friso, or none, has no such function
+    def version() -> str:  # sent as code, not by name: an older friso, or none, has no such function
         try:
             from friso.studies.study import equations_version
         except ImportError as error:

@@ -1,5 +1,7 @@
-"""Check that friso works on this machine, and describe the machine for a bug report,
-without names of users or folders."""
+"""Check that friso works on this machine, and describe the machine for a bug report.
+
+The report leaves out names of users and folders.
+"""
 
 from __future__ import annotations
 
@@ -60,12 +62,12 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     for subject, look, remedy in steps:
         try:
             yield DoctorCheck(subject, look())
-        except Exception as error:  # whatever is wrong is what was asked for
+        except Exception as error:  # any failure is a result of the check
             yield DoctorCheck(subject, _without_names(f"{type(error).__name__}: {error}", full_paths), False, remedy)
 
 
 def _packages() -> Iterator[DoctorCheck]:
-    """Yield the versions of what friso needs, and of what it reads further formats with."""
+    """Yield the versions of required packages, and of those for further file formats."""
     try:
         needed = requires("friso") or []
     except PackageNotFoundError:
@@ -93,7 +95,7 @@ def _packages() -> Iterator[DoctorCheck]:
 
 
 DEVELOPMENT = ("test", "docs", "bench")
-"""Extras of no use to a user."""
+"""Extras that only developers need."""
 
 
 def _processor() -> str:
@@ -162,17 +164,17 @@ def _stage() -> Stage:
 
 
 def _without_names(text: str, full_paths: bool) -> str:
-    """Return the text with homes as ~, and the name of the user elsewhere in paths as USER."""
+    """Return the text with home folders as ~, and the user's name elsewhere in paths as USER."""
     if full_paths:
         return text
     home = user = ""
-    with suppress(RuntimeError):  # of a user without a home
+    with suppress(RuntimeError):  # raised for a user without a home
         home = str(Path.home())
-    with suppress(OSError, KeyError, ImportError):  # without a name
+    with suppress(OSError, KeyError, ImportError):  # raised for a user without a name
         user = getpass.getuser()
-    written = (home, repr(home)[1:-1]) if len(home) > 3 else ()  # not a root; errors double backslashes
+    written = (home, repr(home)[1:-1]) if len(home) > 3 else ()  # skip the root; messages double backslashes
     word = r"""[^\s\\/'":;,]+"""
-    name = rf"""(?:{word}(?: {word})*(?=[\\/'"])|{word})"""  # such as ANNMIL~1, or Ann Miller before what is below
+    name = rf"""(?:{word}(?: {word})*(?=[\\/'"])|{word})"""  # such as ANNMIL~1, or Ann Miller before a subfolder
     homes = [*map(re.escape, written), rf"(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+{name}"]
     text = re.sub(rf"({'|'.join(homes)})(?!\w)", "~", text, flags=re.IGNORECASE)
     return re.sub(rf"(?<=[\\/._-]){re.escape(user)}(?![^\W_])", "USER", text, flags=re.IGNORECASE) if user else text

@@ -1,4 +1,4 @@
-"""Judge a stage with uncertain numbers by the verdicts on many stages drawn from it."""
+"""Judge an uncertain stage by the verdicts on many stages drawn from it."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class Fates:
-    """The verdicts on drawn stages, and which of their loops are unstable, both (count,).
+    """Verdicts on drawn stages, and which of their loops are unstable, both (count,).
 
-    Verdicts are words of `friso.hunting.criteria.VERDICTS`; a loop is `unstable` sticking or sliding. `amplitudes` [m],
-    half of peak to peak, and `periods` [s] are those of the first draws that hunt, shape (count,) or shorter; NaN
-    without an attractor, or without certainty.
+    Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
+    sticks, or slides. `amplitudes` [m], half of peak to peak, and `periods` [s] belong to the first draws, shape
+    (count,) or shorter; NaN for a stage that has no attractor, or an uncertain one.
     """
 
     verdicts: np.ndarray
@@ -47,8 +47,8 @@ class Fates:
         """Return how well each key separates hunting stages from others, the most decisive first.
 
         The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if all hunting stages have
-        the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. Empty if all stages hunt,
-        or none.
+        the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. The result is empty if all
+        stages hunt, or none.
         """
         from scipy.stats import mannwhitneyu  # 0.7 s to import
 
@@ -65,9 +65,9 @@ class Fates:
 
 
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
-    """Return the fates of the drawn stages as given and, with a joint, locked and free.
+    """Judge the drawn stages as given and, if they have a joint, also locked and free.
 
-    After Ctrl-C, they are those of the stages judged in all variants by then, without sizes of hunting.
+    After Ctrl-C, the result has the stages judged in all variants by then, without sizes of hunting.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -94,7 +94,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 @dataclass(frozen=True)
 class DrawnEdges:
-    """Edges of hunting of drawn stages in bandwidth [Hz], shape (count,), each between `low` and `high`.
+    """Edges of hunting of drawn stages in bandwidth [Hz], (count,), each between `low` and `high`.
 
     Both are NaN for a stage whose hunting does not begin or end within the tried bandwidths.
     """
@@ -129,7 +129,7 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
     """Return how many stages may be drawn for a fixed amount of work.
 
-    It is a power of two, for which Sobol's points are even.
+    It is a power of two, for which Sobol's points are spread evenly.
     """
     settings = StudySettings.current()
     with allowance() as spent:
@@ -162,9 +162,9 @@ class Draws:
         margin: Margin | None = None,
         progress: Progress = silent,
     ) -> Draws:
-        """Judge the stages of a sample, and find the edges of the first ones near the stage's `margin`.
+        """Judge the stages of a sample, and find the edges of hunting of the first ones.
 
-        See `fates`.
+        Edges are looked for near the stage's `margin`. `fates` makes the verdicts.
         """
         judged = fates(stage, sample, rtol, progress)
         count = len(next(iter(judged.values())).verdicts)
@@ -187,7 +187,7 @@ def different(stage: Stage) -> dict[str, Stage]:
 
 
 def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally) -> Fates:
-    """Judge some of the drawn stages."""
+    """Judge a chunk of the drawn stages."""
     flat = laid_over(stage, {key: values[chunk] for key, values in sample.keys.items()})
     count = chunk.stop - chunk.start
     judged = Fates(judge_many(flat, count, rtol), loops_unstable(flat, count))
@@ -201,7 +201,7 @@ def _joined(parts: Sequence[Fates]) -> Fates:
 
 
 def _with_swings(stage: Stage, sample: Sample, judged: Fates) -> Fates:
-    """Add amplitudes and periods of the hunting of the first drawn stages."""
+    """Add amplitudes and periods for those of the first drawn stages that hunt."""
     first_ones = min(sample.count, StudySettings.current().draws_of_a_swing)
     amplitudes, periods = np.full((2, first_ones), np.nan)
     swinging = np.flatnonzero(np.isin(judged.verdicts[:first_ones], ATTRACTED))

@@ -24,8 +24,9 @@ _T = TypeVar("_T")
 class Crew:
     """An executor with its size and a function to end it.
 
-    `size` is the number of blocks computed side by side, and `shares` the number that a study needs for all to have
-    work. A flag, shape (1,), ends blocks in progress early. It also has the error to raise if it fails itself.
+    `size` is the number of blocks computed side by side, and `shares` the number of blocks that a study needs to keep
+    all busy. `cancel`, a flag of shape (1,), ends blocks in progress early. `failures` are the errors that mean that
+    the executor itself failed.
     """
 
     executor: Executor
@@ -65,7 +66,7 @@ class Crew:
                     yield *flying.pop(future), self._result(future)
         finally:
             self.cancel[0] = 1
-            if not self.broken:  # cancelled meanwhile, futures would have it stumble and leave processes behind
+            if not self.broken:  # a failed executor would stumble over cancelled futures and leave processes behind
                 for future in flying:
                     future.cancel()
                 wait(flying, timeout=settings.block_timeout)
@@ -116,7 +117,7 @@ def local_crew(threads: int | None = None) -> Crew:
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
-    """Return the measures of single cells, given by their numbers in C order."""
+    """Compute the measures of single cells, given by their numbers in C order."""
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
     for _, block, columns in crew.compute(crew.jobs([picked])):

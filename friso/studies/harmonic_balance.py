@@ -1,4 +1,4 @@
-"""Compare limit cycles by harmonic balance with the true ones, to show that the textbook method misleads."""
+"""Compare limit cycles by harmonic balance with simulated ones, which shows where it misleads."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SAMPLES = 16_384
-"""Samples per period of the simulated cycle from which multi-harmonic balance starts."""
+"""Samples per period of the simulated cycle from which balance with several harmonics starts."""
 
 CYCLE = "the symmetric cycle, closed as an orbit: it attracts where the multiplier is below 1 in size, else it repels"
 APPROXIMATION = "harmonic balance, an approximation"
 PREDICTED = ("solutions", "least_residual")
-"""Attribute `of` of the variables, and the variables that single-harmonic balance predicts."""
+"""Value of the attribute `of`, and the variables that balance with a single harmonic predicts."""
 
 HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
-"""Default orders of the highest harmonic."""
+"""Default orders of the highest harmonic of balance with several harmonics."""
 
 
 @check_arguments
@@ -103,7 +103,10 @@ def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
 def _errors(
     stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
 ) -> list[tuple[float, float, str]]:
-    """Return relative errors of period and amplitude of one stage, and the status, for every highest harmonic."""
+    """Return relative errors of period and amplitude of one stage, with a status.
+
+    There is one entry for every highest harmonic.
+    """
     single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES
     run = single.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)

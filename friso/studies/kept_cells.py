@@ -25,7 +25,7 @@ class KeptCells:
         self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
 
     def keeping(self, ask: Ask) -> Ask:
-        """Return `ask` with its answers stored."""
+        """Return the function `ask`, changed to store its answers."""
         self.folder.mkdir(exist_ok=True)
         number = count()
 
@@ -45,7 +45,7 @@ class KeptCells:
         remove_folder(self.folder)
 
     def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
-        """Return the results stored for exactly these cells, None without any."""
+        """Return the results stored for exactly these cells, or None."""
         forms = {name: np.dtype(form_of(name)) for name in self.metrics}
         most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
         columns = kept_arrays(file, self.digest, most)

@@ -22,7 +22,7 @@ class Ledger:
     metrics: tuple[str, ...]
 
     def has(self, number: str) -> bool:
-        """Tell whether a block was written."""
+        """Tell whether a block is recorded as written."""
         return self._file(number).exists()
 
     def entered(self) -> list[str]:
@@ -30,7 +30,7 @@ class Ledger:
         return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
 
     def enter(self, number: str) -> None:
-        """Record a block whose chunks were written. Raises OSError."""
+        """Record a block after its chunks were written. Raises OSError."""
         self._file(number).parent.mkdir(exist_ok=True)
         put(self._file(number), self._entry(number))
 
@@ -49,7 +49,7 @@ class Ledger:
     def digest(self, number: str, name: str) -> str | None:
         """Return the recorded digest of a chunk.
 
-        None if its block was not recorded, "" if the record is damaged. Raises PermissionError.
+        It is None if its block was not recorded, and "" if the record is damaged. Raises PermissionError.
         """
         try:
             entry = json.loads(stored(self._file(number)))

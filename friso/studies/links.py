@@ -1,4 +1,4 @@
-"""Links: stage keys that follow the axes of a study by an expression, such as "0.7 * mass" or "gap + 2 um".
+"""Evaluate links: expressions such as "0.7 * mass" for stage keys that follow the axes of a study.
 
 Numbers without a unit are in SI.
 """
@@ -30,8 +30,8 @@ _OPERATORS: dict[type, Any] = {
 }
 _FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
 _KEY, _ELEMENT = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+"), re.compile(r"\.([0-9]+)\b")
-"""Patterns of a key, and of the number of an array element in it, controller.filters.2.frequency; Python would write
-[2]."""
+"""Patterns of a key, and of the number of an array element in a key, as in controller.filters.2.frequency. Python
+itself would write [2]."""
 
 _QUANTITY = re.compile(r"(?<![\w.])[0-9.]+(?:[eE][+-]?[0-9]+)?\s+[^\W\d_][\w/*^²³]*(?:/\([\w*^]+\))?")
 """Pattern of a number with a unit, which has no blanks: "2 um", "0.5 N*s/m", "3 N/(m*s)"."""
@@ -63,7 +63,7 @@ def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) ->
     numeric = stage.numeric_keys()
     for key in links:
         if key not in numeric:
-            stage.flat({key: 0.0})  # raises, and names the nearest key
+            stage.flat({key: 0.0})  # raises an error that names the nearest key
         if key in axes and key not in names({key: links[key]}):
             text = f"{key} = {links[key]}, which does not follow the axis {key}"
             raise InputError("link", text, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
@@ -79,7 +79,7 @@ def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any
     """
     numbers = dict(values)
     for key, text in links.items():
-        with np.errstate(all="ignore"):  # what comes out as no number makes the cell invalid
+        with np.errstate(all="ignore"):  # a result that is no number makes the cell invalid
             numbers[key] = _value(_parsed(key, text), numbers)
     return {key: numbers[key] for key in links}
 
@@ -99,7 +99,7 @@ def _parsed(key: str, text: str) -> ast.expr:
 
 
 def _check(node: ast.expr) -> None:
-    """Raise ValueError for anything but arithmetic."""
+    """Raise ValueError for anything but arithmetic in an expression."""
     match node:
         case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
             _check(left)

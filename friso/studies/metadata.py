@@ -1,8 +1,8 @@
 """Store and check the metadata of a store: one file (.zmetadata) with its digest, and a copy for repair.
 
-Zarr's readers take everything but the numbers from it; files beside the arrays repeat it for other programs, and are
-rewritten if they differ. friso's own notes are there too: the digests of the axes, and colours of the figures beside
-the store.
+Zarr's readers take everything but the numbers from this file. Files beside the arrays repeat it for other programs, and
+are rewritten if they differ. The file also has friso's own notes: the digests of the axes, and colours of the figures
+beside the store.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _FILE, _COPY, _OWN, _ATTRIBUTES = ".zmetadata", ".zmetadata.copy", "friso", ".za
 """Names of the metadata file, its copy, friso's entry, and the entry with the attributes of the study."""
 
 _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
-"""Patterns of metadata files beside the arrays and of files of axes, the only ones that a store may name."""
+"""Patterns of metadata files beside the arrays, and of files of axes: the only files that metadata may name."""
 
 _KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"blosc", "crc32"}
-"""Allowed number and text types with their size; allowed codecs, which only decode."""
+"""Allowed number and text types, with their size, and allowed codecs, which only decode."""
 _CHUNK = 1 << 30
-"""Largest chunk in memory, that of the longest axis."""
+"""Largest chunk in memory [bytes]: that of the longest axis."""
 
 _EXPECTED = "a store made by friso map, or a new name"
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
@@ -74,7 +74,7 @@ class Metadata:
         return dict(self.files[_ATTRIBUTES])
 
     def damaged_files(self, path: Path) -> list[str]:
-        """Return the metadata files of the store at `path` that differ."""
+        """Return the metadata files of the store at `path` whose content differs from these metadata."""
         return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
@@ -194,7 +194,10 @@ def is_store(path: Path) -> bool:
 
 
 def _says(file: Path, content: Any) -> bool:
-    """Tell whether a JSON file has exactly this content, in which 1 is neither 1.0 nor true."""
+    """Tell whether a JSON file has exactly this content.
+
+    The number 1 counts as different from 1.0 and from true.
+    """
     try:
         return digest(json.loads(stored(file))) == digest(content)
     except (OSError, ValueError, RecursionError):
@@ -202,7 +205,7 @@ def _says(file: Path, content: Any) -> bool:
 
 
 def _mentions(file: Path, words: bytes) -> bool:
-    """Tell whether some words are in a file."""
+    """Tell whether a file contains some words."""
     try:
         return words in stored(file)
     except OSError:
@@ -212,8 +215,8 @@ def _mentions(file: Path, words: bytes) -> bool:
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
     """Tell whether the files named by metadata are possible in a store.
 
-    None lies elsewhere; arrays are numbers or texts as friso writes them, because other codecs may run code; and each
-    axis is complete.
+    No file may lie outside. Arrays must be numbers or texts as friso writes them, because other codecs may run code.
+    Each axis must be complete.
     """
     if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
         return False

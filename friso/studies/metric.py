@@ -1,7 +1,8 @@
-"""Define metrics of a map: the computation, colours and words of a cell's value, each in a module of `metrics`.
+"""Define metrics of a map: how a cell's value is computed, coloured and named.
 
-Such a module has `METRIC` and the name of the metric; installed packages name theirs in the entry points
-`friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow from it.
+Each metric is a module of `metrics`. Such a module has `METRIC` and the name of the metric; installed packages name
+theirs in the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all
+follow from it.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class RunEvidence:
 class StageEvidence:
     """Evidence on the stages of cells: flat keys, attractors and motions.
 
-    `verdicts` simulates more and returns a word for each stage.
+    The function `verdicts` runs further simulations, and returns a word for each stage.
     """
 
     flat: Mapping[str, Any]
@@ -64,7 +65,7 @@ class Word:
 
 @dataclass(frozen=True)
 class MapFinding:
-    """A statement on a map: the fraction of cells with one of the `words`, and their place.
+    """A statement on a map: which fraction of cells has one of the `words`, and where they lie.
 
     For counts, it is the fraction of cells above 0. With `if_any` the statement is left out if no cell has the word.
     """
@@ -176,7 +177,10 @@ def usual_metrics() -> tuple[str, ...]:
 
 
 def with_usual(metric: str) -> tuple[str, ...]:
-    """Return the variables of a study for a map of a metric, with all others that cost nothing."""
+    """Return the variables of a study for a map of a metric.
+
+    All metrics that cost nothing beside it are included.
+    """
     every = metrics()
     wanted = every[every[metric].shown_as or metric]
     along = [name for name, other in every.items() if other.usual and other.source in ("run", wanted.source)]
@@ -214,6 +218,6 @@ def is_text(variable: str) -> bool:
 
 
 def worded(verdicts: bool = False) -> list[str]:
-    """List the metrics with words; with `verdicts` only the outcome and the verdicts."""
+    """List the metrics with words; with `verdicts`, only the outcome and the verdicts."""
     every = metrics().items()
     return [name for name, one in every if one.words and (one.verdict or name == "outcome" or not verdicts)]

@@ -1,4 +1,7 @@
-"""Compute studies in separate processes on this machine, over private pipes: no port is opened."""
+"""Compute studies in separate processes on this machine.
+
+They talk over private pipes, so no port is opened.
+"""
 
 from __future__ import annotations
 
@@ -23,20 +26,20 @@ from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 
 _cancel = np.zeros(1, np.int64)
-"""Flag that ends the block of this process early; in a worker, memory shared with its parent."""
+"""Flag that ends the block of this process early. In a worker it is memory shared with the parent."""
 
 
 @contextmanager
 def processes(workers: int) -> Iterator[Crew]:
     """Return a crew of worker processes on this machine.
 
-    Each computes one block at a time, in one thread. They end with this process, however it ends.
+    Each computes one block at a time, in one thread. The workers end with this process, however it ends.
     """
     context = get_context("spawn")
     with interrupts_held(), _modules_of_this_folder_ignored():
         shared: Any = context.RawArray("q", 1)
         pool = ProcessPoolExecutor(workers, context, _prepare, (shared, cache_folder()))
-        for _ in range(workers):  # each starts one
+        for _ in range(workers):  # each task starts one worker
             pool.submit(os.getpid)
     cancel = np.frombuffer(shared, np.int64)
     with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
@@ -47,7 +50,7 @@ def processes(workers: int) -> Iterator[Crew]:
 def _modules_of_this_folder_ignored() -> Iterator[None]:
     """Start Python processes within the block that import nothing from the current folder.
 
-    It may belong to someone else, and contain a file with the name of a module.
+    The folder may belong to someone else, and contain a file with the name of a module.
     """
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
@@ -63,20 +66,20 @@ _SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def run_block(*arguments: Any) -> Columns:
-    """Run `run_cells` in a worker, until done or cancelled by the crew."""
+    """Run `run_cells` in a worker, until it is done or the crew cancels it."""
     return run_cells(*arguments, cancel=_cancel)
 
 
 def _prepare(shared: Any, cache: Path) -> None:
     """Make this process a worker.
 
-    Ctrl-C is left to the parent process, with which it ends. It uses the parent's cache of kernels, even a temporary
-    one.
+    Ctrl-C is left to the parent process, and the worker ends with its parent. It uses the parent's cache of kernels,
+    even a temporary one.
     """
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)
     os.environ[FOLDER_VARIABLE] = str(cache.parent)
-    sys.stdout = sys.stderr  # what plug-ins print is no answer
+    sys.stdout = sys.stderr  # output of plug-ins must not mix with answers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(cache,), daemon=True).start()
 
@@ -85,5 +88,5 @@ def _end_with_parent(cache: Path) -> None:
     parent = parent_process()
     assert parent is not None
     wait([parent.sentinel])
-    remove_if_passing(cache)  # which it was killed before it could
+    remove_if_passing(cache)  # the parent was killed before it could remove it
     os._exit(1)

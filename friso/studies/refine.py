@@ -1,6 +1,6 @@
 """Sample adaptively: outcomes over a grid four times finer per axis, for a fifth of its runs.
 
-A lattice of every second cell of the given grid is run first. Wherever neighbouring cells differ, both are run, until
+A lattice of every second cell of the given grid is run first. Where neighbouring cells differ, both are run, until
 every change of outcome (or of verdict, if computed) has been seen from both sides; so a boundary that was met once is
 followed to its end. Remaining runs go to the most uncertain cells: far from any run, near boundaries, and where runs
 settle late.
@@ -38,7 +38,7 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """Return the axis with cells in between, as if a range had been given with so many points."""
+    """Return the axis with cells in between, as if a range had been given with that many points."""
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -58,7 +58,7 @@ def asked_for(study: Study) -> Study:
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:
-    """Return the measures of a fine study, each of shape (cells,), from the computed cells.
+    """Compute a fine study from some of its cells; return measures, each of shape (cells,).
 
     A cell that was not computed has the outcome (and the verdict) of the nearest computed one, a status that says so,
     and no numbers.
@@ -70,7 +70,8 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
         cells = grid.unseen_changes()
         if not cells.size:
             batch = max(1, grid.budget // settings.refine_batches)
-            cells = grid.likely_surprises(min(left - batch, batch))  # one batch is kept to follow what it finds
+            # keep one batch to follow the changes that it shows
+            cells = grid.likely_surprises(min(left - batch, batch))
         if not cells.size:
             break
         grid.learn(cells[:left], ask)
@@ -98,7 +99,10 @@ class _Grid:
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
-        """Compute cells, and store their results; invalid cells cost no run."""
+        """Compute cells, and store their results.
+
+        Invalid cells do not count as runs.
+        """
         columns = ask(cells)
         for name in columns:
             self.columns.setdefault(name, unfilled(name, self.computed.size))[cells] = columns[name]
@@ -106,7 +110,10 @@ class _Grid:
         self.runs += int(np.sum(columns["outcome"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distance to the nearest computed cell, and its number, both of the study's shape."""
+        """Return the distance to the nearest computed cell, and the number of that cell.
+
+        Both have the study's shape.
+        """
         from scipy.ndimage import distance_transform_edt  # 0.2 s to import
 
         transform: Any = distance_transform_edt(~self.computed, return_indices=True)
@@ -114,7 +121,10 @@ class _Grid:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Return which cells have a neighbour with other words, each with the words of the nearest computed cell."""
+        """Return which cells have a neighbour with other words.
+
+        A cell counts with the words of the nearest computed cell.
+        """
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)
@@ -131,7 +141,7 @@ class _Grid:
         return np.flatnonzero(self._changes(nearest) & ~self.computed)
 
     def likely_surprises(self, count: int) -> np.ndarray:
-        """Return the numbers of up to `count` cells that are most worth a run."""
+        """Return the numbers of the cells, at most `count`, that are most worth a run."""
         settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 

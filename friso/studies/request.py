@@ -1,4 +1,4 @@
-"""Read a user's variations into a study, estimate its size, and run a trial."""
+"""Make a study from a user's variations, estimate its size, and run a trial."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TRIED = 512
 
 @dataclass(frozen=True)
 class Request:
-    """A stage, what is varied in it, and links, as given (see `friso.sweep`).
+    """A stage, what is varied in it, and links, as the user gives them (see `friso.sweep`).
 
     With `log`, ranges that do not state their spacing are logarithmic.
     """

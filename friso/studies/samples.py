@@ -1,4 +1,4 @@
-"""Unstructured samples of several keys at once: Sobol points and Latin hypercubes, through `scipy.stats.qmc`."""
+"""Draw samples of several keys at once: Sobol points and Latin hypercubes, through `scipy.stats.qmc`."""
 
 from __future__ import annotations
 

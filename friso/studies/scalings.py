@@ -17,7 +17,7 @@ from friso.studies.links import names
 
 @dataclass(frozen=True)
 class Scaling:
-    """An axis of factors: its words, the scaling, and the table that a stage needs for it."""
+    """Axis of factors: its words, the scaling, and the table that a stage needs for it."""
 
     words: str
     scaled: Callable[[Mapping[str, Any], Any], dict[str, Any]]
@@ -35,7 +35,8 @@ force."""
 def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
     """Return stages multiplied by the scaling factors among the columns.
 
-    They are flat keys; a name that links use is a free variable. Raises InputError if a stage has nothing to scale.
+    The stages are flat keys; a name that links use is a free variable. Raises InputError if a stage has nothing to
+    scale.
     """
     for name, scaling in SCALINGS.items():
         if name in columns and name not in names(links):

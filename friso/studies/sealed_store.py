@@ -1,4 +1,7 @@
-"""Give Zarr a store with checked metadata and chunks. Imports zarr, which takes 0.4 s."""
+"""Give Zarr a store whose metadata and chunks are checked.
+
+The module imports zarr, which takes 0.4 s.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
 class SealedStore(WrapperStore[LocalStore]):
     """A store whose metadata come from `metadata`, whatever its files contain.
 
-    Some versions of Zarr read these files one by one, others the combined one. Chunks must be those recorded for
+    Some versions of Zarr read the files one by one, others the combined one. Chunks must be those recorded for
     completed blocks.
     """
 
@@ -43,7 +46,7 @@ class SealedStore(WrapperStore[LocalStore]):
         return type(self)(store, self.metadata)
 
     def with_read_only(self, read_only: bool = False) -> SealedStore:
-        """Return the store, read-only or not.
+        """Return the store, read-only or writable.
 
         Zarr before 3.1.6 lacks this for such a store.
         """

@@ -48,7 +48,7 @@ class StudySettings(Settings):
     """Draws whose amplitude and period are reported. A range of fewer leaves a tenth of the machines out."""
 
     draws_of_an_edge: int = setting(16, "")
-    """Draws whose edge of hunting is searched, each of which takes as many searches as there are steps."""
+    """Draws whose edge of hunting is searched. Each takes as many searches as `steps_of_an_edge`."""
 
     steps_of_an_edge: int = setting(17, "")
     """Bandwidths tried for each edge. Fewer give a coarser edge."""
@@ -90,7 +90,7 @@ class StudySettings(Settings):
     """Range about 0, in scatters, within which the curve cannot be seen to bend."""
 
     least_noise: float = setting(0.01, "")
-    """Least noise, relative to the end, if points are too few to show their noise."""
+    """Least noise, relative to the end, assumed if points are too few to show their noise."""
 
     fit_steps: int = setting(10_000, "")
     """Most steps of a fit. One that needs more does not converge."""
@@ -102,19 +102,19 @@ class StudySettings(Settings):
     """Fewest points; two are a line."""
 
     most_points: int = setting(100_000, "")
-    """Most points. More take seconds and add nothing."""
+    """Most points. More take seconds and improve nothing."""
 
     reached_friction: float = setting(0.9, "")
     """Friction that a curve must reach, relative to static friction, to show break-away."""
 
     late_points: int = setting(20, "")
-    """Fraction of points (one in so many) that must go as far, so that a single outlier does not count."""
+    """Share of points, one in so many, that must reach that friction, so that a single outlier does not count."""
 
     backward_share: float = setting(0.01, "")
     """Largest backward displacement that is noise, not a turn."""
 
     curve_error: float = setting(0.02, "")
-    """Largest difference of virgin curves that a measurement cannot show."""
+    """Largest difference of virgin curves that a measurement cannot resolve."""
 
     number_gain: int = setting(4, "")
     """Penalty of a free number, twice as large as in Akaike's criterion."""
@@ -123,7 +123,7 @@ class StudySettings(Settings):
     """Difference of Akaike's criterion below which fits are as likely as the best."""
 
     slope_errors: float = setting(3.0, "")
-    """Standard errors of the initial slope within which fits are alike."""
+    """Standard errors of the initial slope within which fits agree."""
 
     first_friction: float = setting(1 / 3, "")
     """Largest force of the first point, over static friction, that shows the initial stiffness."""
@@ -193,7 +193,8 @@ class StudySettings(Settings):
     """Relative tolerance of the solver along a loop, below the last digit of the table."""
 
     loop_amplitudes: tuple[float, float] = setting((0.1, 0.5), "")
-    """Amplitudes of loops over static friction by initial stiffness: one with hardly any slip, one with slip."""
+    """Amplitudes of loops, in units of static friction over initial stiffness: one with hardly any slip, one with
+    slip."""
 
     loop_error: float = setting(0.05, "")
     """Relative difference of areas or stiffnesses that a log hardly shows."""
@@ -205,10 +206,11 @@ class StudySettings(Settings):
     """Machines on which a controller alone is tried. Fewer cannot show a fraction of 99 %."""
 
     needed_rtol: float = setting(1e-5, "")
-    """Relative tolerance of their moves, whose times are then off by a thousandth; that moves none into position."""
+    """Relative tolerance of moves with a controller alone. Their times are off by a thousandth, which brings no machine
+    into position."""
 
     limit_factors: int = setting(400, "")
-    """Factors on the bandwidth that are tried below its limit, so that the fastest lies within a percent of it."""
+    """Factors on the bandwidth tried below its limit. With 400 the fastest lies within a percent of the limit."""
 
     followed_share: float = setting(0.5, "")
     """Fraction of machines in position from which longer runs are made. With fewer, an option fails anyway, and its

@@ -59,7 +59,7 @@ COORDINATES = "coordinates"
 
 
 class Store:
-    """The results of a study in a folder, locked by this process while it is open."""
+    """Results of a study in a folder, which is locked by this process while open."""
 
     def __init__(self, path: Path, study: Study) -> None:
         settings = StudySettings.current()
@@ -92,11 +92,11 @@ class Store:
             refuse_other(path, study)
             _warn_of_another_machine(path)
             remove_partial_files(path)
-            checked_metadata(path).mend(path)  # as they are now: another process may have noted something
+            checked_metadata(path).mend(path)  # read again: another process may have added a note
             yield store
 
     def _replace(self) -> None:
-        """Replace the present store by this study, unless it already is this study's."""
+        """Replace the present store by this study, unless the store is this study's already."""
         with lock_store(self.path) as lock:
             try:
                 refuse_other(self.path, self.study)
@@ -112,7 +112,7 @@ class Store:
         from numcodecs import CRC32
 
         study, coordinates = self.study, self.study.coordinates()
-        # Arrays of a single empty cell, which is not written, are then given their size: none of it is ever computed.
+        # arrays start with one empty cell, which is not written, and then get their size, so that nothing is computed
         cells = {
             name: np.full((1,) * len(study.names), "" if is_text(name) else np.nan, form_of(name))
             for name in study.metrics
@@ -120,7 +120,7 @@ class Store:
         variables = {
             name: (study.names, cell, attributes_of(name, study.stage.axis_kind)) for name, cell in cells.items()
         }
-        checked = {"filters": [CRC32()]}  # for whoever reads a part of it
+        checked = {"filters": [CRC32()]}  # for readers of single chunks
         encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
         for name in encoding:
             encoding[name] |= {} if is_text(name) else {"_FillValue": np.nan}
@@ -136,7 +136,7 @@ class Store:
                 for part, how, mode in parts:
                     part.to_zarr(folder, mode=mode, encoding=how, zarr_format=_FORMAT, consolidated=False)  # type: ignore[call-overload]
             indent = zarr.config.get("json_indent")
-            for name in study.metrics:  # Zarr's own resize would list all chunks that there may be
+            for name in study.metrics:  # Zarr's own resize would list every possible chunk
                 place = folder / name / ".zarray"
                 array = json.loads(place.read_text(encoding="utf-8"))
                 place.write_text(
@@ -165,7 +165,10 @@ class Store:
                 yield block
 
     def done(self) -> list[str]:
-        """Return the numbers of the completed blocks, by existing files, because a store may state any size."""
+        """Return the names of the completed blocks.
+
+        They are read from existing files, because a store may claim any size.
+        """
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
     @property
@@ -174,7 +177,7 @@ class Store:
         return len(self.done()) == self._count
 
     def state(self) -> StoreState:
-        """Return the progress of the study, damaged parts, and unreadable parts."""
+        """Return how far the study is done, and its damaged and unreadable parts."""
         ledger, done = self.ledger, self.done()
         damaged: list[str] = []
         unreadable: list[str] = []
@@ -197,7 +200,7 @@ class Store:
         return math.prod(self._counts)
 
     def _is_of_block(self, number: str) -> bool:
-        """Tell whether a name is that of a block's files."""
+        """Tell whether a name is a valid name of a block's files."""
         parts = number.split(".")
         return len(parts) == len(self._counts) and all(
             re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
@@ -213,7 +216,7 @@ class Store:
         import zarr
 
         shape = tuple(part.stop - part.start for part in block)
-        # an empty chunk is written too: that it is there is entered like any other
+        # empty chunks are written too, because the record lists every chunk
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
             for name in self.study.metrics:
@@ -232,7 +235,7 @@ class Store:
 
     @property
     def notes(self) -> Mapping[str, Any]:
-        """Return friso's own notes on the store."""
+        """Return friso's own notes on the store, such as colours of figures."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
@@ -275,7 +278,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
             raise ValueError("other chunks than friso writes")
         check_verified(runs.attrs, study.cells)
         return runs
-    except Exception:  # whatever a codec, or a study, makes of what it cannot read
+    except Exception:  # any error of a codec, or of a damaged study
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
         actual = "a store whose axes are damaged, or whose study this friso cannot read"
         raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path)) from None
@@ -285,8 +288,8 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 class StoreState:
     """State of a study's store.
 
-    It has the number of blocks, the number of those done, and the numbers of damaged blocks. It also lists damaged
-    files of metadata, which the next run writes anew, and chunks that may not be read.
+    It has the number of blocks, how many are done, and the numbers of damaged blocks. It also lists damaged files of
+    metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
     """
 
     blocks: int
@@ -310,7 +313,7 @@ def check_store(path: Path) -> StoreState:
 
 
 def holds_all(path: Path, study: Study) -> bool:
-    """Tell whether the store at `path` is whole, and of this study."""
+    """Tell whether the store at `path` is complete, undamaged, and of this study."""
     try:
         refuse_other(path, study)
         return check_store(path).is_whole
@@ -319,7 +322,7 @@ def holds_all(path: Path, study: Study) -> bool:
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
-    """Return the study of an opened store in memory, with each distinct text once.
+    """Load the study of an opened store into memory, with each distinct text once.
 
     As stored, a status takes a hundred times the memory.
     """
@@ -329,7 +332,7 @@ def in_memory(runs: xr.Dataset) -> xr.Dataset:
 
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
-    """Return the texts as objects, equal ones being one object."""
+    """Return the texts as objects; equal texts share one object."""
     settings = StudySettings.current()
     import pandas as pd
 
@@ -355,7 +358,7 @@ def _let_zarr_finish() -> None:
 
 
 def refuse_other(path: Path, study: Study) -> None:
-    """Check that a store has this study. Raises StoreError if it has another one."""
+    """Check that the store at `path` has this study. Raises StoreError if it has another one."""
     with read_store(path) as dataset:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:

@@ -1,6 +1,7 @@
-"""Read files of a store safely: only regular files of the store itself, no larger than friso writes them.
+"""Read files of a store safely.
 
-A store may come from others.
+A store may come from others, so only regular files of the store itself are read, and none larger than friso writes
+them.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from friso.platform.system import shell_word
 from friso.platform.whole_file import PARTIAL, whole_file
 
 MOST_BYTES = 64 << 20
-"""Largest file of a store. The largest chunk, of incompressible texts, has a sixth of it."""
+"""Largest file of a store [bytes]: six times the largest chunk, which has incompressible texts."""
 
 
 MOST_EXPANDED = 1 << 30
-"""Most bytes of the arrays of an archive, because a small one may claim many."""
+"""Most bytes of the arrays in an archive, because a small archive may claim any size."""
 
 
 def stored(file: Path) -> bytes:
@@ -41,8 +42,8 @@ def stored(file: Path) -> bytes:
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
     """Return the SHA-256 of a file of a store, or beside it; None if there is none.
 
-    It is also None for anything but a file, or more than `most` bytes. Raises PermissionError if it cannot be read,
-    which does not mean that it is damaged.
+    It is also None for anything but a regular file, or for more than `most` bytes. Raises PermissionError if the file
+    cannot be read, which does not mean that it is damaged.
     """
     try:
         return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
@@ -55,7 +56,8 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
     """Return the arrays that `keep_arrays` wrote into a file.
 
-    None if they are damaged, are `about` something else, or have more than `most` bytes; none is expanded then.
+    They are None if they are damaged, are `about` something else, or have more than `most` bytes; none is expanded
+    then.
     """
     try:
         content = stored(file)
@@ -68,7 +70,7 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
         archive.seek(0)
         with np.load(archive, allow_pickle=False) as arrays:
             return dict(arrays)
-    except Exception:  # whatever NumPy makes of an archive that others gave a sound digest
+    except Exception:  # any error of NumPy in an archive that others gave a valid digest
         return None
 
 
@@ -147,7 +149,7 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
     """Yield all entries of a folder and its subfolders, each folder before its content.
 
-    The depth is that of a store; no link is followed.
+    It goes as deep as a store does, and follows no link.
     """
     with os.scandir(folder) as entries:
         for entry in entries:

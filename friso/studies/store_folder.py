@@ -1,7 +1,7 @@
-"""Manage the folder of a store: make it elsewhere and move it into place, exchange it, and lock it for one process.
+"""Manage the folder of a store: make it aside, move it into place, exchange it, and lock it.
 
-The next process repairs the state that a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store
-being made, in a folder with its lock. With the suffix `.old` it is a store being replaced.
+The next process repairs what a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being
+made, in a folder with its lock. With the suffix `.old` it is a store being replaced.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class ReadOnlyStoreError(StoreError):
 
 
 def where_links_lead(path: Path) -> Path:
-    """Return the real place of a store, where files are made and replaced, not a link to it.
+    """Return the real place of a store, following links.
 
-    Raises StoreError for a link that leads nowhere, as to a disk that is missing.
+    Files are made and replaced there. Raises StoreError for a link that leads nowhere, such as to a missing disk.
     """
     if path.is_symlink() and not path.exists():
         actual = f"a link to {os.path.realpath(path)}, where nothing is"
@@ -57,13 +57,13 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
             rename_folder(new, path)
         except OSError:
             if not path.exists():
-                raise  # else another process was quicker; whose study that is will be seen
+                raise  # otherwise another process was quicker, and its study is checked later
 
 
 def refuse_others_files(path: Path) -> None:
     """Refuse to replace a store whose folder has other files, which would be deleted with it.
 
-    Raises: StoreError: naming the first of what friso did not write.
+    Raises StoreError, which names the first file that friso did not write.
     """
     others = []
     for item in sorted(path.iterdir()):
@@ -81,13 +81,13 @@ def refuse_others_files(path: Path) -> None:
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
     """Replace the store at `path` by one that `fill` writes.
 
-    Its lock is held, and it is deleted once the new one is in place. Raises OSError, with the store unchanged. Ctrl-C
-    waits until one of the two is in place.
+    The old store's lock is held, and it is deleted once the new one is in place. Raises OSError, with the old store
+    unchanged. Ctrl-C waits until one of the two is in place.
     """
     with _made_aside(path, fill) as new, hold_interrupts():
         old = _free_name(path, _OLD)
         if not MOVES_OPEN_FOLDERS:
-            lock.release()  # whoever takes it now keeps the folder from being renamed
+            lock.release()  # a process that takes the lock now prevents the renaming
         rename_folder(path, old)
         try:
             rename_folder(new, path)
@@ -100,8 +100,8 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
 def remove_leftovers(path: Path) -> None:
     """Remove leftovers of killed processes beside the store at `path`.
 
-    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if it cannot be
-    put back.
+    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if a store
+    cannot be put back.
     """
     path = Path(os.path.realpath(path))
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
@@ -126,9 +126,9 @@ def remove_partial_files(path: Path) -> None:
 
 @contextmanager
 def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
-    """Keep other processes out of a store; return the lock.
+    """Lock a store against other processes; return the lock.
 
-    Raises StoreError if another one is still in it after `patience` [s], ReadOnlyStoreError if nothing can be written.
+    Raises StoreError if another one still has it after `patience` [s], ReadOnlyStoreError if nothing can be written.
     """
     lock = FileLock(path / LOCK)
     try:
@@ -149,12 +149,12 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
     """Return the folder that `fill` has written, to be moved away.
 
-    Ctrl-C waits for its end: otherwise the threads of Zarr would write on into a deleted folder.
+    Ctrl-C waits until it is written: otherwise the threads of Zarr would write on into a deleted folder.
     """
     draft = _free_name(path)
     try:
         draft.mkdir(mode=DRAFT_MODE, parents=True)
-        with FileLock(draft / LOCK):  # locked, it is no leftover
+        with FileLock(draft / LOCK):  # the lock shows that this is no leftover
             new = draft / "store"
             with hold_interrupts():
                 fill(new)

@@ -1,4 +1,4 @@
-"""Define a study as data: a stage, its variations and tolerance; its cells and blocks of cells."""
+"""Define a study as data: a stage, its variations and tolerance, its cells and blocks of cells."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Study:
             yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
-        """Return the stage of one cell, which run alone gives equal numbers.
+        """Return the stage of one cell, which gives equal numbers when run alone.
 
         Raises InputError for an invalid cell.
         """
@@ -136,7 +136,7 @@ class Study:
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
-        """Return a study of only these cells, side by side."""
+        """Return a study of only the numbered cells, side by side."""
         columns = self.columns(cells)
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
@@ -154,7 +154,7 @@ class Study:
         return coordinates
 
     def attributes(self) -> dict[str, Any]:
-        """Return the attributes stored with results, so that any cell can be run again alone."""
+        """Return the attributes stored with results, from which any cell can be run again alone."""
         return {
             "name": self.stage.name,
             "stage": self.stage.to_toml(),
@@ -168,13 +168,13 @@ class Study:
         }
 
     def _named(self) -> str:
-        """Return the axes, dimension by dimension, by name."""
+        """Return the names of the axes, grouped by dimension."""
         return ", ".join(" with ".join(axis.name for axis in dimension.axes) for dimension in self.dimensions)
 
     def differences(self, other: Study, its_equations: str) -> list[str]:
-        """Return in words how a stored study, `other`, differs from this one.
+        """Describe in words how a stored study, `other`, differs from this one.
 
-        It was made by `its_equations`.
+        The stored study was made by the version `its_equations`.
         """
         differences = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
@@ -187,7 +187,7 @@ class Study:
                 for mine, its in zip(self.axes, other.axes, strict=True)
                 if _described(mine) != _described(its)
             ]
-        if list(self.links.items()) != list(other.links.items()):  # in order: a link sees those before it
+        if list(self.links.items()) != list(other.links.items()):  # the order counts: a link sees the links before it
             differences.append(f"links: {_links(other)} there, {_links(self)} here")
         if lacking := [name for name in self.metrics if name not in other.metrics]:
             differences.append(f"measures: none of {', '.join(lacking)} there")
@@ -239,7 +239,7 @@ def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:
 
 
 def _described(axis: SweptAxis) -> str:
-    """Return an axis in short; equal texts mean equal values."""
+    """Describe an axis in short; equal texts mean equal values."""
     digest = hashlib.sha256(np.ascontiguousarray(axis.values).tobytes()).hexdigest()[:8]
     first, last = axis.values[0], axis.values[-1]
     ends = f"{first:g}..{last:g} {axis.unit}" if axis.numeric else f"{first}..{last}"
@@ -247,7 +247,7 @@ def _described(axis: SweptAxis) -> str:
 
 
 def _links(study: Study) -> str:
-    """Return the links as they were given."""
+    """Return the links as the user gave them."""
     return ", ".join(f"{key}={expression}" for key, expression in study.links.items()) or "none"
 
 

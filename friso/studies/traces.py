@@ -1,4 +1,4 @@
-"""Runs of cells as lines to draw: how far each position is from its reference, the extremes of short times."""
+"""Reduce runs of cells to lines to draw: extremes of the deviation over short times."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DRAWING = "drawing runs"
 class Traces:
     """Deviations of positions from their references [m], reduced for drawing.
 
-    `deviations`, shape (cells, 2 BINS), are the two extremes of each of BINS pieces of `duration` [s], in order, NaN
+    `deviations`, shape (cells, 2 BINS), has the two extremes of each of BINS pieces of `duration` [s], in order, NaN
     after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final behaviour: half of
     the time after its last corner.
     """
@@ -36,9 +36,9 @@ class Traces:
 
 
 def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress = silent) -> Traces:
-    """Return the runs of all cells of a study once more, at its tolerance.
+    """Run all cells of a study once more, at its tolerance, and reduce them for drawing.
 
-    Cells that no stage may have, and those `skipped`, shape (cells,), are NaN throughout.
+    Invalid cells, and those `skipped`, shape (cells,), are NaN throughout.
     """
     settings = StudySettings.current()
     columns = study.columns(np.arange(study.cells))
@@ -73,7 +73,7 @@ def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np
 
 
 def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Position minus reference [m]; NaN beyond what was sampled."""
+    """Return position minus reference [m]; NaN after the last sample."""
     deviation = np.full(reference.shape, np.nan)
     sampled = position[: len(reference)]
     deviation[: len(sampled)] = sampled - reference[: len(sampled)]
@@ -81,9 +81,9 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def _extremes(values: np.ndarray) -> np.ndarray:
-    """Return the least and the largest value of each piece, in their order.
+    """Return the least and the largest value of each piece, in order of time.
 
-    NaN if a piece is not complete.
+    They are NaN if a piece is not complete.
     """
     settings = StudySettings.current()
     pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)

@@ -1,5 +1,4 @@
-"""Estimate how far a map can be trusted: run a sample of its cells again at a tighter
-tolerance."""
+"""Estimate how far a map can be trusted: run some of its cells again at a tighter tolerance."""
 
 from __future__ import annotations
 
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
 
 
 TRIED = 400
-"""Cells on which a tolerance is chosen: 1 % of them are four."""
+"""Number of cells on which a tolerance is chosen: 1 % of them are four."""
 
 
 def checked_share(share: float) -> float:
-    """Return the fraction of cells to verify. Raises InputError for one that is none."""
+    """Return the fraction of cells to verify. Raises InputError for a number that is no fraction."""
     if not 0 <= share <= 1:
         raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
@@ -36,14 +35,14 @@ def checked_share(share: float) -> float:
 def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
     """Run a fraction of the cells again at rtol/100; return attributes with the fraction that survived.
 
-    The cells are the same for the same study. Of a refined map, inferred cells are run too, and counted apart
-    (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
-    stated if there are no others, no fraction was asked for, or the attributes of the runs state it.
+    A study always verifies the same cells. In a refined map, inferred cells are run too, and counted apart
+    (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive. Nothing is
+    returned if there are no others, no fraction was asked for, or the attributes of the runs state it already.
     """
     settings = StudySettings.current()
     if (
         share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST
-    ):  # there is no tolerance to check it with
+    ):  # no tighter tolerance is available
         return {}
     count, rtol = (
         max(settings.least_verified, round(share * study.cells)),
@@ -69,7 +68,7 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
     """Check attributes of a store, which others may have written.
 
-    Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study of so many cells.
+    Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study with `cells` cells.
     """
     for checked, same in (("verified_cells", "verified_surviving"), ("inferred_checked", "inferred_confirmed")):
         if checked in attributes and not 0 <= index(attributes[same]) <= index(attributes[checked]) <= cells:
@@ -81,9 +80,9 @@ def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
     """Return the loosest tolerance at which `WANTED` of the outcomes survive.
 
-    Also returns the surviving fraction at each tolerance tried, and the number of cells used. If no cell has a stage,
-    there are none, and the tightest tolerance is returned. If no tolerance is good enough, it is the one at which most
-    survive.
+    Also returns the surviving fraction at each tolerance tried, and the number of cells used. If no cell has a valid
+    stage, there are no fractions, and the tightest tolerance is returned. If no tolerance is good enough, it is the one
+    at which most outcomes survive.
     """
     settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
@@ -115,7 +114,7 @@ def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.
         order = rng.permutation(study.cells)
         return np.sort(order[condition(order)][:count])
     accepted = np.empty(0, int)
-    for _ in range(20):  # of a map nearly all of which is unwanted, fewer must do
+    for _ in range(20):  # give up with fewer if nearly all cells of the map are unwanted
         new = rng.integers(0, study.cells, 2 * count)
         accepted = np.unique(np.concatenate([accepted, new[condition(new)]]))
         if len(accepted) >= count:
@@ -133,7 +132,7 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
 
 
 def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
-    """For each cell, whether it was "run" to its end, is `INFERRED`, or "" neither."""
+    """Return for each cell "run" if it ran to its end, `INFERRED`, or "" for neither."""
     status, outcome = (_at(runs[name], study, cells).astype(str) for name in ("status", "outcome"))
     kinds = np.where(np.isin(outcome, ["invalid", "failed", ""]), "", "run")
     return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

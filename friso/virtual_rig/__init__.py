@@ -1,1 +1,1 @@
-"""The drive as built, and the experiments of a virtual test rig on it."""
+"""Run stages with their real drive, for the experiments of a virtual test rig."""

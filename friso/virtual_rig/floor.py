@@ -1,4 +1,4 @@
-"""Vibration of the floor over time, from its spectrum."""
+"""Generate the vibration of the floor over time from its spectrum."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.errors import InputError
 from friso.stage.rig import Floor
 
 FLOOR = int.from_bytes(b"floor")
-"""Second half of the Philox key for random numbers of the floor."""
+"""Second half of the Philox key for random numbers of the floor's vibration."""
 
 
 def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int) -> np.ndarray:
@@ -30,7 +30,7 @@ def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int
     step = 1 / (size * interval)
     waves = min(int(highest / step + 0.5), (size - 1) // 2) + 1
     edges = np.concatenate([[0.0], (np.arange(waves) + 0.5) * step])
-    edges[-1] = max(edges[-1], highest)  # what little is beyond the last wave
+    edges[-1] = max(edges[-1], highest)  # the last wave takes what lies beyond it
     rng = np.random.Generator(np.random.Philox(key=[seed, FLOOR]))
     cosine, sine = rng.standard_normal((2, waves)) * np.sqrt(np.diff(variance_below(floor, edges)))
     spectrum = np.zeros(size // 2 + 1, dtype=complex)

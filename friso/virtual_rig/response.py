@@ -1,4 +1,4 @@
-"""The time response of a stage with its drive as built, in its surroundings: as `friso simulate` shows it."""
+"""Compute the time response of a stage with its real drive in its surroundings, for `friso simulate`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LOGGED = {"position": ("measured_position", "m", "position that the drive reads"
 
 
 def response(stage: Stage, rtol: float | None = None, sample_time: float | None = None, seed: int = 0) -> xr.Dataset:
-    """Run a stage's own motion on its drive as built, and return its time response.
+    """Run a stage's own motion on its real drive, and return its time response.
 
     Variables over `time` [s] are those of `friso.engine.simulate`, the encoder reading and the command. Samples
     coincide with the drive's; by default there are some twenty thousand. Noise is drawn from `seed`. Raises InputError
@@ -50,7 +50,10 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
 
 
 def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
-    """Return the measures of recorded runs of the stages `flat`; the force is the drive's command."""
+    """Return the measures of recorded runs of the stages `flat`.
+
+    The force is the drive's command.
+    """
     attempted, rejected = (
         recorded.statistics[:, STATISTICS.index(name)].astype(np.int64) for name in ("attempted", "rejected")
     )

@@ -1,4 +1,4 @@
-"""Runs of a stage with its drive as built, in lanes, and what the drive would log of them."""
+"""Run a stage with its real drive, in lanes, and record what the drive would log."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ SENSOR = int.from_bytes(b"sensor")
 
 @dataclass(frozen=True)
 class RecordedRuns:
-    """Numbers of the runs and their records, every `interval` [s].
+    """Runs and their records, every `interval` [s].
 
-    `logged` are the signals that the drive knows, `true` what really moves, by the names of the roles of a log: SI,
-    shape (runs, n), NaN after a failure; `statuses` tell of failures, shape (runs,), `statistics` of the solver;
-    `outputs` are all that the equations tell, if asked for. Where the delay is no whole number
-    of samples, `true` and the relative position stand at the instant of the force, that fraction of a sample later.
+    `numbers` are the numbers of the runs. `logged` are the signals that the drive knows, `true` the real motion, by the
+    names of the roles of a log: SI, shape (runs, n), NaN after a failure. `statuses` tell of failures, shape (runs,);
+    `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for. If the delay is no
+    whole number of samples, `true` and the relative position are taken at the instant of the force, that fraction of a
+    sample later.
     """
 
     numbers: np.ndarray
@@ -50,20 +51,20 @@ class RecordedRuns:
 
     @property
     def time(self) -> np.ndarray:
-        """Times of the samples [s], shape (n,)."""
+        """Return the times of the samples [s], shape (n,)."""
         return np.arange(self.logged["position"].shape[1]) * self.interval
 
 
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the flat keys of a stage with a complete drive; unstated properties are ideal.
+    """Return the flat keys of a stage with a complete drive.
 
-    `changes` are SI numbers, or arrays with one for each run.
+    Properties that the file does not state are ideal. `changes` are SI numbers, or arrays with one for each run.
     """
     return with_complete_drive(stage.flat(changes))
 
 
 def with_complete_drive(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys completed by those of an ideal drive."""
+    """Return flat keys with missing keys of the drive added, at their ideal values."""
     flat = anywhere(flat)
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": flat.get("drive.integrator_reset", False) * 1.0}
@@ -80,12 +81,12 @@ def run(
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Iterator[RecordedRuns]:
-    """Run a stage as built several times, each with its own noise, logged every `interval` [s].
+    """Run a stage with its real drive several times, each with its own noise.
 
-    The interval is a whole number of samples. `changes` are flat keys to SI numbers, or arrays of one for each run: of
-    a sweep, or of machines drawn at random. The runs come chunk by chunk; they are the same for any number of threads.
-    Raises InputError for an interval that does not fit the samples, and for a [rail] along which this law does not
-    vary.
+    Signals are logged every `interval` [s], a whole number of samples. `changes` are flat keys to SI numbers, or to
+    arrays with one number for each run, as in a sweep or for machines drawn at random. The runs come chunk by chunk,
+    and are equal for any number of threads. Raises InputError for an interval that does not fit the samples, and for a
+    [rail] along which this friction law does not vary.
     """
     yield from run_flat(as_built_keys(stage, changes), stage.floor, task, seeds, interval, threads)
 
@@ -101,8 +102,8 @@ def run_flat(
 ) -> Iterator[RecordedRuns]:
     """Run stages with a complete drive as `run` does, on a floor that may shake.
 
-    They are given as flat keys. With `outputs`, all signals of the equations are recorded, not only those that the
-    drive and a sensor see.
+    The stages are given as flat keys. With `outputs`, all signals of the equations are recorded, not only those that
+    the drive and a sensor see.
     """
     settings = RigSettings.current()
     _check(flat, interval)
@@ -152,7 +153,7 @@ def _recorded(
     timing: tuple[float, int, int | None],
     with_outputs: bool,
 ) -> RecordedRuns:
-    """Run moves on the virtual rig, and return the signals that the drive records."""
+    """Run a task on stages with their drive, and return the signals that the drive records."""
     settings = RigSettings.current()
     interval, count, threads = timing
     seeds = flat["drive.seed"].astype(np.int64)
@@ -209,7 +210,7 @@ def _outputs(
 
 
 def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Interpolate an evenly spaced table at places counted in its points.
+    """Interpolate an evenly spaced table at places, counted in the table's points.
 
     Beyond its ends the table keeps its end values.
     """

@@ -1,4 +1,4 @@
-"""Tuning numbers of `friso.virtual_rig`, with the reason for each."""
+"""Settings of `friso.virtual_rig`, with a reason for each."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class RigSettings(Settings):
-    """Settings of runs of the machine as built."""
+    """Settings of runs with the real drive."""
 
     rig_rtol: float = setting(1e-4, "")
-    """Relative tolerance of runs. A step is at most a sample long: looser runs show in the logs, tighter ones take
+    """Relative tolerance of runs. A step is at most a sample long. Looser runs show in the logs; tighter ones take
     longer."""
 
     steps_per_sample: int = setting(200, "")

@@ -1,5 +1,7 @@
-"""Build the surroundings of the drive: friction and motor constant over position,
-floor and injection over time."""
+"""Build the surroundings of the drive as tables.
+
+Friction and motor constant are tables over position; floor and injected force are tables over time.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ from friso.virtual_rig.task import MoveTask
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
     """Return the tables of runs, over place and over time.
 
-    Stages are given as flat keys to SI numbers or arrays of shape (runs,); `seeds` are those of the runs' noise, while
-    rails have the machines' "rail.seed". All runs share one table if they do not differ.
+    Stages are given as flat keys to SI numbers or arrays of shape (runs,). `seeds` are the seeds of the runs' noise;
+    rails have the machines' "rail.seed". If the runs do not differ, all share one table.
     """
     places, grid = _places(flat, task)
     varied = [key for key, value in flat.items() if key.startswith(("rail.", "drive.ripple")) and np.ndim(value)]

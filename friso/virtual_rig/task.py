@@ -15,17 +15,17 @@ from friso.stage import Stage
 from friso.stage.motion import QUADRATIC, ReferenceForm
 
 SAMPLE_TIME = 50e-6
-"""Sample time [s] of a drive that states none: that of the thesis (Sec. 3.5.2)."""
+"""Sample time [s] of a drive that states none, as in the thesis (Sec. 3.5.2)."""
 
 
 @dataclass(frozen=True)
 class MoveTask:
-    """The motion of runs as built: pieces of the reference and what happens meanwhile.
+    """The task of runs with the real drive: pieces of the reference, and an injected force.
 
     Pieces (see `friso.equations.reference`) have the shape (pieces, 1 + inputs) and a `form`; for runs with different
-    moves (runs, pieces, 1 + inputs). There are the duration [s], and the injected force [N] every `injected_each` [s],
-    shape (n,), empty for none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the
-    reference does, or displaced from it by `displacement` [m].
+    moves the shape is (runs, pieces, 1 + inputs). There are the duration [s], and the injected force [N] every
+    `injected_each` [s], shape (n,), empty for none; the drive logs it unless it is `unknown` to it. The stage starts at
+    rest where the reference does, or displaced from it by `displacement` [m].
     """
 
     pieces: np.ndarray
@@ -78,21 +78,24 @@ def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
 
 
 def standing(place: float, duration: float) -> MoveTask:
-    """Return a reference that stays at a place [m]."""
+    """Return the task of standing at a place [m] for a duration [s]."""
     return MoveTask(np.array([[0.0, place, 0.0, 0.0]]), duration)
 
 
 def staircase(steps: Sequence[float], stands: float) -> MoveTask:
-    """Return a reference of steps [m] in turn from 0, standing for a time [s] before and after each."""
+    """Return the task of taking steps [m] in turn from 0.
+
+    The reference stands for a time [s] before and after each step.
+    """
     places = np.cumsum([0.0, *steps])
     rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
     return MoveTask(np.array(rows), stands * len(places))
 
 
 def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
-    """Return a reference of constant velocities [m/s] in turn, each for a time [s].
+    """Return the task of moving at constant velocities [m/s] in turn, each for a time [s].
 
-    It begins at `start` [m]; a velocity of 0 is a standstill.
+    The reference begins at `start` [m]; a velocity of 0 is a standstill.
     """
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
@@ -101,7 +104,7 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 
 
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
-    """Return a reference that moves from place to place [m], standing for a time [s] after each move.
+    """Return the task of moving from place to place [m], standing for a time [s] after each move.
 
     Acceleration [m/s^2] and speed [m/s] are bounded.
     """

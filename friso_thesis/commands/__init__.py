@@ -1,1 +1,1 @@
-"""The commands of this package, one module each, which pyproject.toml declares as entry points of friso."""
+"""Commands of this package, one module each, which pyproject.toml declares as entry points of friso."""

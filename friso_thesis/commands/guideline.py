@@ -1,4 +1,4 @@
-"""`friso guideline`: finished parts of its sweeps are kept until all are done."""
+"""Run `friso guideline`, keeping finished parts of its sweeps until all are done."""
 
 from __future__ import annotations
 

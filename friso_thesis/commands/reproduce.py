@@ -1,4 +1,7 @@
-"""`friso reproduce`: finished pieces are kept until all are done, in a folder that is named after single claims."""
+"""Run `friso reproduce`, keeping finished pieces until all are done.
+
+If single claims are judged, the folder is named after them.
+"""
 
 from __future__ import annotations
 

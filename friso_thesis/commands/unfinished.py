@@ -1,4 +1,4 @@
-"""Long work that goes on where it was interrupted: what is said of it, and what is left of it."""
+"""Continue long work where it was interrupted, and say what is left."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ class UnfinishedWork(Protocol):
 
     @property
     def count(self) -> int:
-        """Return how many pieces are kept."""
+        """Return the number of pieces kept."""
         ...
 
     def clear(self) -> None:
-        """Forget them."""
+        """Delete all pieces."""
 
 
 @contextmanager
 def kept_until_done(work: UnfinishedWork, piece: str, pieces: str) -> Iterator[None]:
-    """Within, finished `pieces` are kept, from which the same command resumes; where none is finished, no folder is
-    left."""
+    """Keep finished `pieces` within the block, so that the same command can resume.
+
+    If no piece is finished, no folder is left.
+    """
     assert work.folder is not None
     missing = [folder for folder in (work.folder, *work.folder.parents) if not folder.exists()]
     try:
@@ -42,7 +44,7 @@ def kept_until_done(work: UnfinishedWork, piece: str, pieces: str) -> Iterator[N
             with hold_interrupts():
                 work.clear()
                 for folder in missing:
-                    with suppress(OSError):  # what others put there stays
+                    with suppress(OSError):  # other files in the folder stay
                         folder.rmdir()
         raise
     work.clear()

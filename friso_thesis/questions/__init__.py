@@ -1,1 +1,1 @@
-"""The functions of this package, a module each, which answer like friso's own."""
+"""Functions of this package, one module each, which answer like friso's own."""

@@ -1,1 +1,1 @@
-"""What is computed: the thesis's studies and claims, its guideline, and its own experiments of the rig."""
+"""Compute the thesis's studies and claims, its guideline, and its own experiments of the rig."""

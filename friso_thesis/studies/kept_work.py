@@ -1,5 +1,7 @@
-"""Keep finished pieces of long work in a folder until all is done,
-so that an interrupted run goes on from there."""
+"""Keep finished pieces of long work in a folder until all is done.
+
+An interrupted run continues from them.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +31,12 @@ class KeptWork:
     folder: Path | None = None
 
     sources: ClassVar[tuple[str, ...]]
-    """Folders and files, besides the equations, whose contents decide on saved results.
-
-    Paths start from the package friso."""
+    """Folders and files, besides the equations, whose contents decide on saved results. Paths start from the package
+    friso."""
 
     @property
     def count(self) -> int:
-        """Return how many pieces are kept."""
+        """Return the number of pieces kept."""
         if self.folder is None or not self.folder.exists():
             return 0
         return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
@@ -51,8 +52,10 @@ class KeptWork:
         make: Callable[[], Mapping[str, np.ndarray]],
         names: Collection[str] | None = None,
     ) -> Mapping[str, np.ndarray]:
-        """Return arrays by name `about` something, as they were kept, with just those `names`,
-        or made now."""
+        """Return arrays by name, as saved under `about`, or computed now.
+
+        A saved piece must have exactly the given `names`.
+        """
         file = self._file("npz", *about)
         columns = None if file is None else kept_arrays(file)
         if columns is not None and (names is None or columns.keys() == {*names}):
@@ -71,5 +74,5 @@ class KeptWork:
 
 @cache
 def _built_on() -> str:
-    """Return what decides on a result besides friso's code."""
+    """Return a description of all that decides on a result besides friso's code."""
     return f"{machine()}, scipy {version('scipy')}"

@@ -1,1 +1,1 @@
-"""The kinds of parameter files, one file each, which declares `FORMAT` (`friso.drives.format`)."""
+"""Kinds of parameter files, each in a file that declares `FORMAT` (`friso.drives.format`)."""

@@ -100,7 +100,7 @@ HELD = frozenset(
     }
 )
 HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforward", "error_deadband"))
-"""Names in [controller] that the parameters hold; the velocity loop belongs to the drive."""
+"""Names in [controller] that the parameters hold. The velocity loop belongs to the drive."""
 
 
 def recognises(name: str, text: str) -> bool:
@@ -115,7 +115,7 @@ def whole(text: str, beside: Beside) -> str:
     """
 
     def taken_in(line: re.Match[str]) -> str:
-        """Return the text that takes the place of an #INCLUDE line."""
+        """Return the text that replaces an #INCLUDE line."""
         included = beside(line[1])
         return line[0] if included is None else _INCLUDE.sub("", included)
 
@@ -157,7 +157,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 
 def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
-    """Return the letter of a joint, such as X; empty if a letter has several joints."""
+    """Return the letter of a joint, such as X; "" if a letter has several joints."""
     number = int(name.partition("_")[2])
     is_named = name.startswith("JOINT") and number < len(letters) and counts[letters[number]] == 1
     return letters[number] if is_named else ""
@@ -239,9 +239,9 @@ def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
 
 
 def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
-    """List what an INI file cannot tell of the drive's velocity loop.
+    """List what an INI file cannot tell about the drive's velocity loop.
 
-    Its gain and its sample time are asked for, and the scale of the output unless FF1 is about 1.
+    They are its gain and its sample time, and the scale of the output unless FF1 is about 1.
     """
     gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
     meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"
@@ -370,7 +370,7 @@ def _velocity(
 
 
 def _unity(axis: AxisParameters) -> bool:
-    """Tell whether FF1 is about 1, so that the output is in machine units per second."""
+    """Tell whether FF1 is about 1, which means that the output is in machine units per second."""
     return UNITY[0] <= axis.number("FF1", 0.0) <= UNITY[1]
 
 
@@ -433,7 +433,7 @@ def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion,
 def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """Compute the parameters of the `pid` component from a stage.
 
-    Raises InputError for a controller that the component cannot be.
+    Raises InputError for a controller that the component cannot represent.
     """
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES

@@ -113,7 +113,7 @@ _OF_AXIS = re.compile(r"(?:(odrv[0-9]+)\.)?(axis[0-9]+)\.(.*)")
 _MODULE = re.compile(r"^(?:odrive\.)?enums\.")
 
 IN_TURNS = "motor.config.torque_constant"
-"""A parameter whose presence shows that the gains are in turns and N m."""
+"""Parameter whose presence shows that the gains are in turns and N m."""
 
 OLD = frozenset({"setpoints_in_cpr", "A_per_css", "counts_per_step", "current_ramp_rate", "CTRL_MODE"})
 NEW = frozenset({"torque_lim", "torque_ramp_rate", "turns_per_step", "input_mode", "CONTROL_MODE", "ControlMode"})
@@ -123,7 +123,7 @@ NEWEST = frozenset({"config.motor", "config.encoder_bandwidth", "config.torque_s
 Firmware up to 0.4 has gains in counts; 0.5 has gains in turns."""
 
 FASTEST = 1000.0
-"""Speed in turns per second beyond any motor; a higher limit must be in counts."""
+"""Speed in turns per second beyond any motor. A higher limit must be in counts."""
 
 TURNS_EXPECTED = "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6"
 IN_TURNS_INSTEAD = (
@@ -204,13 +204,13 @@ def _refuse_other_firmware(axis: AxisParameters) -> None:
 
 
 def _in_counts(name: str, value: str) -> InputError:
-    """Build the refusal of gains that are in encoder counts."""
+    """Build the error for gains that are in encoder counts."""
     actual = f"{quoted(value)}, as in firmware up to 0.4, whose gains are in counts of the encoder and amperes"
     return InputError(name, actual, TURNS_EXPECTED, IN_TURNS_INSTEAD)
 
 
 def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
-    """Return the first parameter or symbol that reveals the firmware; empty if there is none."""
+    """Return the first parameter or symbol that reveals the firmware; "" if there is none."""
     for key, value in axis.values.items():
         symbol = re.match("CTRL_MODE|CONTROL_MODE|ControlMode", value) if isinstance(value, str) else None
         if names & {key.rpartition(".")[2], ".".join(key.split(".")[:2]), symbol[0] if symbol else ""}:
@@ -219,7 +219,7 @@ def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
 
 
 def _fastest(axis: AxisParameters) -> str:
-    """Return a velocity limit that no motor reaches in turns per second; empty if there is none."""
+    """Return a velocity limit that no motor reaches in turns per second; "" if there is none."""
     limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
     return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
 
@@ -416,7 +416,7 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     if flat[f"{name}proportional_on"] != "error":
         raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
     answered = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
-    assert answered is not None  # it was asked for
+    assert answered is not None  # refused earlier if missing
     travel = float(answered)
     force = 2 * pi / travel
     kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
@@ -443,7 +443,7 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
 
 
 def _loop_of_velocity(flat: FlatStage) -> str:
-    """Return the velocity filter that a phase-locked loop can stand for; empty without one."""
+    """Return the velocity filter that a phase-locked loop can stand for; "" without one."""
     places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
     if len(places) != 1 or flat[f"{places[0]}.kind"] != "low_pass":
         return ""

@@ -1,4 +1,4 @@
-"""Linearly implicit methods, one file each, as coefficients."""
+"""Coefficients of linearly implicit methods, one file each."""
 
 from friso.engine.tableaus.rodas4 import RODAS4
 from friso.engine.tableaus.rodas5p import RODAS5P

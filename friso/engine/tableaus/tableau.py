@@ -1,9 +1,9 @@
-"""The coefficients of a Rosenbrock method in the transformed form that needs no matrix-vector product.
+"""Hold the coefficients of a Rosenbrock method, transformed so that it needs no matrix-vector product.
 
-Hairer & Wanner, Solving ODEs II (1996), Sec. IV.7: stage i solves (1/(gamma h) - J) k_i =
-f(t + time_i h, x + sum_j a_ij k_j) + h rate_i df/dt + sum_j c_ij/h k_j. Stiffly accurate: the last stage adds k to
-the solution, and is the error estimate. Between the ends, x(theta) = (1 - theta) x_0 + theta (x_1 +
-(1 - theta) (d_1 + theta (d_2 + ...))) with d_m = sum_j dense_mj k_j.
+Hairer & Wanner, Solving ODEs II (1996), Sec. IV.7: stage i solves (1/(gamma h) - J) k_i = f(t + time_i h, x + sum_j
+a_ij k_j) + h rate_i df/dt + sum_j c_ij/h k_j. Stiffly accurate: the last stage adds k to the solution, and this k is
+the error estimate. Between the ends, x(theta) = (1 - theta) x_0 + theta (x_1 + (1 - theta) (d_1 + theta (d_2 + ...)))
+with d_m = sum_j dense_mj k_j.
 """
 
 from __future__ import annotations

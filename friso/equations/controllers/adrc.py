@@ -157,7 +157,7 @@ def crossing_ratio(observer_ratio: float) -> float:
     upper = np.array([3 * k + 6 * k**2 + k**3, 3 * k**2 + 2 * k**3, k**3])
     lower = np.array([1.0, 3 * k + 2, 3 * k**2 + 6 * k + 1, 0.0, 0.0, 0.0])
 
-    def size(polynomial: np.ndarray) -> np.ndarray:  # of its square over the frequency
+    def size(polynomial: np.ndarray) -> np.ndarray:  # of the squared magnitude over frequency
         even = polynomial.astype(complex) * 1j ** np.arange(len(polynomial) - 1, -1, -1)
         return np.convolve(even, even.conj()).real
 

@@ -27,12 +27,12 @@ TERMS = {
 
 
 def fed_forward(flat: Mapping[str, Any]) -> str:
-    """Return the feedforward terms of a controller in words; empty without any."""
+    """Return the feedforward terms of a controller in words; "" without any."""
     return " + ".join(term for name, term in TERMS.items() if flat.get(ControllerSection.key(name)))
 
 
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
-    """Return the feedforward that moving mass and viscous friction need, by key [SI].
+    """Return the feedforward that moving mass and viscous friction require, by key [SI].
 
     Keys that the controller does not have are left out.
     """

@@ -109,7 +109,7 @@ class PidGains(Pid):
         if flat[KD] and flat[DERIVATIVE_ON] == "measurement" and flat[TAU]:
             listed["derivative of the error"] = {DERIVATIVE_ON: "error"}
         ahead = feedforward_of_moves(flat, "viscous_feedforward", "acceleration_feedforward")
-        if ahead and flat[DERIVATIVE_ON] == "measurement":  # whose derivative opposes the move itself
+        if ahead and flat[DERIVATIVE_ON] == "measurement":  # the derivative of the measurement opposes the move itself
             ahead[cls.key("viscous_feedforward")] = ahead.get(cls.key("viscous_feedforward"), 0.0) + flat[KD]
         if ahead:
             listed["feedforward of the move"] = ahead

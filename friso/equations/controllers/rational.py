@@ -37,7 +37,10 @@ Rounding moves poles by less."""
 
 
 class TransferRoots(NamedTuple):
-    """A transfer function gain prod(x - zeros)/prod(x - poles), in s [1/s] or in z."""
+    """Zeros, poles and gain of a transfer function gain prod(x - zeros)/prod(x - poles).
+
+    The variable x is s [1/s] or z.
+    """
 
     zeros: np.ndarray
     poles: np.ndarray
@@ -58,7 +61,7 @@ class RationalTerms(NamedTuple):
 
 
 def _divides(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the controller's sample time is a whole multiple of the drive's."""
+    """Tell whether the sample time of the controller is a whole multiple of the drive's."""
     if SAMPLE_TIME not in flat or DRIVE_TIME not in flat:
         return True
     ratio = flat[SAMPLE_TIME] / flat[DRIVE_TIME]
@@ -203,7 +206,7 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
         rest, leak = poles[poles != slowest], 1 / slowest.real
         share, static, others = _beside(leak, zeros, rest)
         if share > 0 and static * leak > AT_ZERO and len(rest) + 1 == len(poles):
-            # as a drive's integrators leak, by backward Euler, the pole in z is the very one of the file
+            # a drive's integrator leaks by backward Euler, which gives exactly the file's pole in z
             half = leak * (sample_time or 0.0) / 2
             keys |= {f"{PARTS}.integral": scale * leak * share / (1 - half), f"{PARTS}.leak": leak / (1 - half)}
             stiffness, zeros, poles = scale * leak * static, others, rest
@@ -219,7 +222,7 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
 
 
 def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Split off the part of a transfer function that belongs to its one slow pole.
+    """Split a transfer function into the part of its one slow pole and the rest.
 
     The whole is prod(1 + t s) of zeros over (s + leak) prod(1 + t s) of poles, equal to k0/(s + leak) + R(s). Returns
     k0, R(0) and the times t of the zeros of R.
@@ -249,7 +252,7 @@ def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray,
     largest = 1.0 if sample_time is not None else np.abs(poles).max(initial=0.0)
     lower = np.where(np.abs(lower) <= AT_ZERO * largest, 0.0, lower)
     upper = np.where(np.abs(upper) <= AT_ZERO * largest, 0.0, upper)
-    if np.any(upper == 0) and np.any(lower == 0):  # both cancel
+    if np.any(upper == 0) and np.any(lower == 0):  # a zero and a pole at the integrator cancel
         (upper, upper_rate), (lower, lower_rate) = (
             (np.delete(part, first), np.delete(rate, first))
             for part, rate in ((upper, upper_rate), (lower, lower_rate))
@@ -290,7 +293,7 @@ def _wrong(actual: str, expected: str) -> InputError:
 
 
 def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
-    """Return the error for an unstable pole, in s or in z."""
+    """Return the error message for an unstable pole, in s or in z."""
     if sample_time is None:
         worst = poles[np.argmax(np.real(poles))]
         expected = "poles left of 0, and one at 0 for an integral; a transfer function in z needs its sample_time"

@@ -1,4 +1,4 @@
-"""Define what friction laws with one damped bristle have in common.
+"""Declare what friction laws with one damped bristle have in common.
 
 The rate of the bristle differs from law to law; the rest is as in LuGre.
 """
@@ -47,7 +47,7 @@ def bristle_friction(
 def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
     """Return keys of a law whose bristle has the measured stiffness and damping.
 
-    The keys in `shape` are added; they shape the virgin curve.
+    The keys in `shape`, which shape the virgin curve, are added.
     """
     return {
         **measured.levels.keys,
@@ -64,7 +64,7 @@ def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "
     """
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer
-    viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less
+    viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction with less damping
     if viscous >= least:
         return ""
     return (

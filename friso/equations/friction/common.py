@@ -1,4 +1,4 @@
-"""Define what several friction laws have in common: their keys, and the steady friction level of Eq. 4."""
+"""Define what friction laws have in common: their keys, and the steady friction level of Eq. 4."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class Friction:
 
     `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` gives the
     law's own states, its modes with memory, and the sides of its kinks other than the direction, in a steady motion at
-    the velocity; without it they are those at which the states do not change. At rest all modes with memory have been
-    left.
+    the velocity. Without `sliding`, they are the values at which the states do not change. At rest all modes with
+    memory have been left.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class StribeckSection(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return which form the code of the Stribeck curve takes.
+        """Return the form of the Stribeck curve that decides the equations.
 
         It depends on the exponent, if that is a small whole number, and on asymmetries.
         """

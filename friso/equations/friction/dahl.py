@@ -1,4 +1,7 @@
-"""Dahl friction: Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1); LuGre without Stribeck effect and bristle damping."""
+"""Dahl friction: LuGre without Stribeck effect and bristle damping.
+
+Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1).
+"""
 
 from __future__ import annotations
 
@@ -78,4 +81,4 @@ class Dahl(FrictionSection):
 
 
 NO_SPEED = 1e-3
-"""Stribeck velocity [m/s] given to a law whose friction does not depend on speed; its value is arbitrary."""
+"""Stribeck velocity [m/s] for a law whose friction does not depend on speed. Its value does not matter."""

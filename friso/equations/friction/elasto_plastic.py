@@ -78,7 +78,7 @@ class ElastoPlastic(StribeckSection):
             turns = (side * deflection - (limit + begins) / 2) / (limit - begins) / 2
             swelling: Any = sine(turns)
             rising = (1 + swelling) / 2
-            # beyond z_max z is beyond z_ba too; so written, neither kink jumps at its surface whatever the other's side
+            # z beyond z_max is beyond z_ba, too; written so, neither kink jumps, whatever the side of the other
             shares.append(plastic.beyond * rising + full.beyond * (1 - rising))
             kinks += [plastic, full]
         ahead, behind = shares

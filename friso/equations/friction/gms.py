@@ -1,9 +1,9 @@
 """Generalised Maxwell-slip friction: Al-Bender, Lampaert, Swevers 2005, doi:10.1109/TAC.2005.858676.
 
-How the source's conditions are read: an element sticks until its force *along the motion* reaches its share of the
-level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. An element that is still bent against
-the motion after a reversal goes on sticking, however far s(v) falls below its force; codes that compare abs(F_i) with
-the level let it jump to the other side there.
+The source's conditions are read as follows. An element sticks until its force *along the motion* reaches its share of
+the level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. After a reversal, an element that
+is still bent against the motion goes on sticking, however far s(v) falls below its force. Codes that compare abs(F_i)
+with the level let such an element jump to the other side.
 """
 
 from __future__ import annotations
@@ -142,10 +142,10 @@ class GeneralisedMaxwellSlip(StribeckSection):
                 enter=forward.sign * z - limit,
                 leave=-z * velocity / scale,
                 begins=Piecewise((1, pulled_on), (-1, True)),
-                # the limit to either side, but for the square of what rounding leaves
+                # the limit on either side, except for the squared rounding error
                 entered={z: (z + limit**2 / z) / 2},
             )
-            side = z / sqrt(z**2 + TINY)  # what slips is bent along the motion
+            side = z / sqrt(z**2 + TINY)  # a slipping element is bent along the motion
             slipping = attraction / stiffness * (share * side - stiffness * z / level)
             rate = velocity * (1 - slip.beyond) + slipping * slip.beyond
             states.append(State(z, rate, "m", scale, Role.BRISTLE))

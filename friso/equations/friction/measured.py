@@ -1,7 +1,7 @@
-"""What measurements show of friction, whatever the law.
+"""Describe friction as measurements show it, whatever the law.
 
-They show steady friction over speed, the force over displacement from rest until sliding (the virgin curve), and
-damping at rest. Each law declares these quantities, and which of its parameters they do not determine.
+Measurements show steady friction over speed, the force over displacement from rest until sliding (the virgin curve),
+and damping at rest. Each law declares these quantities, and which of its parameters they do not determine.
 """
 
 from __future__ import annotations
@@ -15,10 +15,8 @@ import numpy as np
 from friso.equations.conditions import LEVELS, level_under_conditions
 
 REACH, POINTS, FURTHER = 60.0, 2000, 200
-"""Length of virgin curves, and numbers of their points.
-
-The length is in units of the deflection that static friction causes at the first stiffness. Points are denser near
-rest. The last number is that of points on a longer curve."""
+"""Length of virgin curves, and numbers of their points. The length is in units of the deflection that static friction
+causes at the first stiffness. Points are denser near rest. The last number is for points on a longer curve."""
 
 NEAR = 1e-6
 """Distance between points, relative to the last, below which no slope is computed."""
@@ -89,13 +87,13 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """Return the Stribeck curve of a law as it was measured, without [conditions]."""
+    """Return the Stribeck curve of a law without the factors of [conditions]."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
 
 
 def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
-    """Return the friction levels under the operating conditions of [conditions]."""
+    """Return the Stribeck curve of a law with the factors of [conditions]."""
     return replace(levels_of(flat), **{name: float(level_under_conditions(flat, name)) for name in LEVELS})
 
 
@@ -125,7 +123,7 @@ def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
 
 
 SLACK = 0.02
-"""Misfit by which a virgin curve may exceed the best and still pass, as a fraction of static friction."""
+"""Misfit, as a fraction of static friction, by which a virgin curve may exceed the best one and still pass."""
 
 
 def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:

@@ -1,6 +1,6 @@
-"""Rolling friction whose stiffness before gross rolling falls with a power of the force.
+"""Rolling friction: stiffness before gross rolling falls with a power of the force.
 
-It is due to Dahl 1976, doi:10.2514/3.61511, here with the Stribeck level, bristle damping and viscous friction of
+The law is due to Dahl 1976, doi:10.2514/3.61511, here with the Stribeck level, bristle damping and viscous friction of
 LuGre. Dahl's exponent i shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i. From rest, 1 - F/F_s =
 (1 + (i - 1) sigma_0 x/F_s)^(-1/(i - 1)); with i = 1 the law is LuGre. It has a single state, so that a reversal from
 rolling leaves the stiffness 2^i sigma_0. Masing's rule, which ball guideways obey (Al-Bender, Symens 2005,
@@ -110,17 +110,17 @@ class Rolling(StribeckSection):
 
 
 LACKS = 0.01
-"""Force that a virgin curve may lack at its last point, as a fraction of static friction."""
+"""Force, as a fraction of static friction, that may be missing at the last point of a virgin curve."""
 
 ROUNDED = 1e-4
-"""Missing force, as a fraction of the level, below which the bristle yields in proportion to it."""
+"""Missing force, as a fraction of the level, below which the bristle yields in proportion to the missing force."""
 
 
 def softening(lacking: Any, exponent: Any) -> Any:
     """Return abs(r)^(i - 1), rounded at r = 0 and still 1 at rest.
 
-    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with d = ROUNDED. A bare power is 0 at r = 0: while the body rolls
-    steadily, bristles would not follow a small change of the level. The linearised law would also change abruptly as i
+    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with d = ROUNDED. A bare power is 0 at r = 0. Bristles of a body that
+    rolls steadily would then not follow a small change of the level, and the linearised law would change abruptly as i
     leaves 1. Rounding changes the force by less than d F_s.
     """
     return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)

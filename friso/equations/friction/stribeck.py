@@ -1,5 +1,7 @@
-"""Static Stribeck friction with a viscous term, regularised: Armstrong-Helouvry, Dupont, Canudas de Wit 1994,
-doi:10.1016/0005-1098(94)90209-7."""
+"""Static Stribeck friction with a viscous term, regularised.
+
+Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,7 @@ class Stribeck(StribeckSection):
         level = stribeck_level(velocity, forward.sign, variant)
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
         even = variant.exponent is None or variant.exponent % 2 == 0
-        smooth = even and not (variant.asymmetric or variant.viscous_asymmetric)  # at rest
+        smooth = even and not (variant.asymmetric or variant.viscous_asymmetric)  # smooth at rest
         static = friction_level("static", variant.conditions)
         component = Component(kinks=() if smooth else (forward,))
         return Friction(force + viscous_force(velocity, forward.sign, variant), static, component)
@@ -64,4 +66,4 @@ class Stribeck(StribeckSection):
 
 
 SLOWEST = 0.01
-"""Velocity scale at which the curve rises from 0, as a fraction of the Stribeck velocity."""
+"""Velocity over which the curve rises from 0, as a fraction of the Stribeck velocity."""

@@ -1,8 +1,9 @@
-"""Moves as drives plan them: every limit up to the jerk, or the snap, is reached as early as the others allow.
+"""Moves as drives plan them: each limit is reached as early as the others allow.
 
-A move of a distance is its step, smoothed by one moving average for each limit. With widths T1 >= T2 + T3 + ... of
-these averages the peaks of its derivatives are D/T1, D/(T1 T2), ...: the widths follow from the limits, the innermost
-first (Lambrechts, Boerlage and Steinbuch 2005, doi:10.1016/j.conengprac.2004.04.010, for the third and fourth order).
+There are limits up to the jerk, or the snap. A move of a distance is its step, smoothed by one moving average for each
+limit. With widths T1 >= T2 + T3 + ... of these averages the peaks of its derivatives are D/T1, D/(T1 T2), ...: the
+widths follow from the limits, the innermost first (Lambrechts, Boerlage and Steinbuch 2005,
+doi:10.1016/j.conengprac.2004.04.010, for the third and fourth order).
 """
 
 from __future__ import annotations
@@ -75,8 +76,8 @@ def plan(distance: Any, limits: Sequence[Any]) -> Plan:
 def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
     """Return the largest width x of an average for which a derivative stays within its limit.
 
-    That is the solution of x (x + inner)^p 2^(p (p - 1)/2) = limit, where the p `further` averages outside are as
-    narrow as they can be: as wide as all within. Newton's method comes from the right, where it cannot overshoot.
+    It solves x (x + inner)^p 2^(p (p - 1)/2) = limit. The p `further` averages outside are as narrow as they can be:
+    each as wide as all averages within it together. Newton's method starts from the right, where it cannot overshoot.
     """
     target = product_of_widths / 2 ** (further * (further - 1) // 2)
     x = target ** (1 / (further + 1))
@@ -92,8 +93,8 @@ def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
 def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
     """Return the pieces of a move that begins at a time [s] and a position [m].
 
-    Some pieces may have no duration. The highest derivative changes where a subset of the widths has passed. The
-    second half mirrors the first, so that the move ends exactly at its target, at rest.
+    Some pieces may have no duration. The highest derivative changes at every sum of some of the widths. The second half
+    mirrors the first, so that the move ends exactly at its target, at rest.
     """
     order = len(move.widths)
     choices = np.array(list(product((0, 1), repeat=order)))

@@ -1,4 +1,4 @@
-"""The masses begin displaced, the reference stands."""
+"""The masses begin displaced and are released; the reference stands still."""
 
 from __future__ import annotations
 

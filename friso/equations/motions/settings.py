@@ -1,4 +1,4 @@
-"""Tuning numbers of motions."""
+"""Settings of motions: limits of their size, and the search for reversals."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ class MotionSettings(Settings):
     """Limits on the numbers of moves and sinusoids, and the resolution of the search for reversals."""
 
     most_moves: int = setting(100, "")
-    """Moves of a profile: each has eight pieces or more, and settling is told for each."""
+    """Most moves of a profile. Each has eight pieces or more, and its own settling time."""
 
     most_tones: int = setting(24, "")
-    """Sinusoids of a reference: each adds to the code of every step, which takes longer to compile."""
+    """Most sinusoids of a reference. Each adds to the code of every step, which takes longer to compile."""
 
     samples_per_period: float = setting(32.0, "")
-    """Samples in a period of the fastest sinusoid among which reversals are sought. With fewer, two reversals that are
-    close to each other are missed, between which feedforward by direction has the wrong sign; more take longer."""
+    """Samples in a period of the fastest sinusoid, among which reversals are sought. With fewer, two reversals close
+    together are missed, and between them feedforward by direction has the wrong sign. More take longer."""

@@ -1,13 +1,12 @@
-"""Solve the single-harmonic balance: the textbook's test for a limit cycle,
-which is no test for hunting.
+"""Solve the single-harmonic balance: the textbook's test for a limit cycle, but no test for hunting.
 
 The friction is replaced by its describing function N(A, omega). The loop then has a periodic motion where 1/R(i omega)
 = N(A, omega), with R the receptance of the loop for a friction force (`loop`). So -1/R + N = 0 is one complex equation
-in A and omega (Gelb, Vander Velde 1968). In every cell of a grid in amplitude and frequency, it is checked whether the
+in A and omega (Gelb, Vander Velde 1968). For every cell of a grid in amplitude and frequency, it is checked whether the
 left side turns around zero along the edges. "No cycle" is then the result of a computation, and not of a solver that
 failed.
 
-Hunting is a jump out of a long rest. Its motion is so far from a sine that this balance finds no cycle where there is
+Hunting is a jump out of a long rest. Its motion is so far from a sine that this balance finds no cycle even if there is
 one: see docs/describing.md.
 """
 
@@ -33,8 +32,8 @@ FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
 
 
 TURN, WITHIN = np.pi / 2, 16
-"""Largest turn [rad] of the loop between neighbouring frequencies, places examined in between, and most halvings of the
-grid."""
+"""Largest turn [rad] of the loop between neighbouring frequencies, and number of parts in which the loop is examined
+between them."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +93,8 @@ def single_harmonic(
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return how often a complex function turns round zero along the edges of each cell.
 
-    This counts the zeros inside, with -1 for those at which it is mirrored. The second result marks cells for which it
-    is unknown, because a corner is NaN; the first is 0 there.
+    This counts the zeros inside, with -1 for mirrored ones. The second result marks cells for which the count is
+    unknown, because a corner is NaN; the first is 0 there.
     """
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
@@ -105,7 +104,7 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
-    """Tell whether places (2, count) lie in or next to their cells (count, 2)."""
+    """Tell whether solutions (2, count) lie in or next to their cells (count, 2)."""
     near = np.ones(len(cells), bool)
     for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
@@ -115,7 +114,7 @@ def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.
 
 @dataclass(frozen=True)
 class _Loop:
-    """Both sides of the balance, at logarithms of amplitude and frequency (2, count)."""
+    """Both sides of the balance, as functions of log amplitude and log frequency (2, count)."""
 
     stage: Stage
     rtol: float

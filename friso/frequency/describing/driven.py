@@ -1,8 +1,9 @@
-"""Solve for the motion of a plant with friction under a sinusoidal force: all amplitudes that a force may cause.
+"""Solve for the motions of a plant with friction under a sinusoidal force.
 
 Masses, joint and parasitic mode are linear; friction acts on the cart through its describing function N(A, omega). A
 force of amplitude Phi on the stage moves the cart by x_c = H_cs Phi - H_cc N x_c. So its amplitude A is a root of A
-abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction.
+abs(1 + H_cc N(A)) / abs(H_cs) = Phi, where H are the compliances of the masses without friction. A force may have
+several roots.
 """
 
 from __future__ import annotations
@@ -50,14 +51,14 @@ class DrivenPlant:
         """
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         compliances = self.compliances[which]
-        with np.errstate(all="ignore"):  # what cannot be computed is NaN or infinite, and no root
+        with np.errstate(all="ignore"):  # failures give NaN or infinity, which is no root
             cart = compliances[:, 1, 0] / (1 + compliances[:, 1, 1] * stiffness)
             stage = compliances[:, 0, 0] - compliances[:, 0, 1] * stiffness * cart
             return amplitudes / np.abs(cart), np.stack([stage, cart], axis=1), stiffness
 
     @cached_property
     def stuck(self) -> float:
-        """Return an amplitude [m] at which bristles do not slip."""
+        """Return an amplitude [m] so small that bristles do not slip."""
         settings = FrequencySettings.current()
         friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
         return float(
@@ -68,7 +69,7 @@ class DrivenPlant:
         )
 
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return amplitudes [m] that need less and more than each force at each frequency.
+        """Return amplitudes [m] that need less, and more, than each force at each frequency.
 
         Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
         and do not depend on other forces.
@@ -90,7 +91,7 @@ class DrivenPlant:
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
-        """Return amplitudes moved until their forces lie below (side -1) or above (side 1) the given ones."""
+        """Return amplitudes moved until their forces lie below (side -1) or above (side 1) given forces."""
         settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
@@ -127,7 +128,7 @@ class DrivenPlant:
 class Roots:
     """Amplitudes [m] of the cart in equilibrium with a force at a frequency, shape (count,).
 
-    `force` and `frequency` are indices. Further arrays tell whether the force rises with the amplitude, and the
+    `force` and `frequency` are indices. `rising` tells whether the force rises with the amplitude, and `error` is the
     remaining relative error. `unknown`, of shape (forces, frequencies), tells whether friction was not found at an
     amplitude at which a root may be.
     """
@@ -160,7 +161,7 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     """Return zeros of many functions between ends with values of opposite sign, and the remaining values.
 
-    The method takes the secant of the bracket and halves the value of an end that stays (Illinois).
+    The method takes the secant of the bracket, and halves the value at an end that stays (Illinois).
     """
     settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)

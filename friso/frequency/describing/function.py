@@ -1,5 +1,4 @@
-"""Compute the describing function of a friction law:
-the response of friction to a sinusoidal motion, by harmonics.
+"""Compute the describing function of a friction law: its response to a sinusoidal motion, by harmonics.
 
 The method is that of Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, McGraw-Hill
 1968. The law is the stage's own (LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053). LuGre has a memory, so its
@@ -158,7 +157,7 @@ def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int
 
 
 def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: int) -> np.ndarray:
-    """Return harmonics of the force [N] from states (runs, samples of a part of the period, states)."""
+    """Return harmonics of the force [N] from states (runs, samples, states) sampled over a part of the period."""
     within = round(samples * share)
     force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T
     period = force if share == 1.0 else np.hstack([force, -force])

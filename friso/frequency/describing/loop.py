@@ -23,8 +23,8 @@ TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer 
 def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions of cart and stage per friction force on the cart [m/N], complex.
 
-    Frequencies [Hz] and results have the shape (frequencies,). The reference rests, the limiter is not touched and the
-    force is not limited.
+    Frequencies [Hz] and results have the shape (frequencies,). The reference rests, the limiter is not touched, and the
+    force is below its limit.
     """
     loop = _loop(shared_structure(flat).standing).at(flat, 1)
     (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
@@ -38,7 +38,7 @@ def _loop(form: Structure) -> Declared:
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)
     outputs = {CART: model.outputs["cart_position"].expression, STAGE: model.outputs["position"].expression}
-    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in model.kinks}  # the stroke, limits in the controller
+    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in model.kinks}  # within the stroke and all limits
     rates = tuple(sp.sympify(rate).subs(within) for rate in model.rhs)
     return Declared(model.symbols, rates, {FORCE: key("bias.cart")}, outputs)
 

@@ -1,9 +1,10 @@
-"""Find a periodic motion of a loop with friction as a Fourier series, by multi-harmonic balance and Newton's method.
+"""Find a periodic motion of a loop with friction as a Fourier series.
 
-Alternating frequency and time (Cameron, Griffin 1989, doi:10.1115/1.3176036): the series gives the velocity in time,
-the velocity the friction force (`waveform`), and its harmonics must move the loop by the series. Mechanics and
-controller may be any linear ones. The method starts from a known motion, such as a simulated one, because it cannot
-find a cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`).
+The method is multi-harmonic balance with Newton's method, alternating frequency and time (Cameron, Griffin 1989,
+doi:10.1115/1.3176036): the series gives the velocity in time, the velocity the friction force (`waveform`), and the
+harmonics of that force must move the loop by the series. Mechanics and controller may be any linear ones. The method
+starts from a known motion, such as a simulated one, because it cannot find a cycle by itself, and single-harmonic
+balance, the usual start, may have none (`balance`).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class HarmonicSeries:
 
     @property
     def period(self) -> float:
-        """Period [s]."""
+        """Return the period [s]."""
         return 2 * np.pi / self.omega
 
     @property
@@ -75,7 +76,7 @@ class Basis:
 
     @classmethod
     def of(cls, harmonics: int, mirrored: bool, intervals: int) -> Basis:
-        """Make a basis up to a harmonic, with so many intervals per period."""
+        """Make a basis up to a harmonic, with `intervals` per period."""
         orders = np.arange(1, harmonics + 1, 2) if mirrored else np.arange(harmonics + 1)
         share = 0.5 if mirrored else 1.0
         angles = 2 * np.pi * (np.arange(int(intervals * share)) + 0.5) / intervals
@@ -101,9 +102,9 @@ def balanced(
 ) -> HarmonicSeries:
     """Return the periodic motion near a known one, with harmonics up to the order `harmonics`.
 
-    `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion, the last sample one
-    interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
-    InputError for a stage without friction or for a law with more than one state of its own.
+    `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion. The last sample
+    lies one interval before the first comes again. A `mirrored` motion is its own mirror image after half a period.
+    Raises InputError for a stage without friction or for a law with more than one state of its own.
     """
     settings = FrequencySettings.current()
     law, size = (
@@ -125,7 +126,7 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return the status of a series that should lie near a motion of this amplitude [m]."""
+    """Return the status of a series that should lie near a motion with the amplitude `length` [m]."""
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
@@ -139,8 +140,8 @@ def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> s
 class _Problem:
     """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
 
-    Unknowns are real and imaginary parts of the harmonics over the length, and the logarithm of omega over the known
-    one; the phase is fixed relative to the known motion.
+    Unknowns are real and imaginary parts of the harmonics, divided by the length, and the logarithm of omega relative
+    to the known motion. The phase is fixed relative to the known motion.
     """
 
     flat: Mapping[str, Any]

@@ -1,8 +1,8 @@
-"""Compute the frequency response of a plant with friction as a drive's analyser measures it, for a given force.
+"""Compute the frequency response of a plant with friction, as a drive's analyser measures it.
 
-The analyser divides the first harmonic of the position by the force (Gelb, Vander Velde 1968, quasi-linear response).
-One force may have several responses. Those at which the force falls with the amplitude are unstable; which of the
-others appears depends on the history of the analyser.
+It depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force (Gelb,
+Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls with the
+amplitude are unstable; which of the others appears depends on the history of the analyser.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int,
 def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
     """Return the response [m/N] that an analyser shows, shape (forces, frequencies).
 
-    NaN if no branch is stable.
+    It is NaN if no branch is stable.
     """
     chosen = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
     answer, lasting = (np.take_along_axis(branches[name], chosen, axis=2)[:, :, 0] for name in ("response", "lasting"))
@@ -145,7 +145,7 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Return the problem with the responses to every force at every frequency, or "done"."""
+    """Return for each force and frequency what is wrong with the responses, or "done"."""
     settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)

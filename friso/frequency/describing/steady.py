@@ -1,9 +1,9 @@
 """Find the periodic steady state of friction under an imposed sinusoidal motion, in lanes.
 
-An internal state forgets its start at the rate at which the motion wears it off: at amplitudes far below the deflection
-at break-away that takes thousands of periods. So the map of the internal states over a period is solved for its fixed
-point, by secants; LuGre's and Dahl's states obey linear equations under an imposed motion, so that their map is affine
-and the first secant is exact.
+An internal state forgets its start as the motion wears it off. At amplitudes far below the deflection at break-away
+that takes thousands of periods. So secants solve for the fixed point of the map of the internal states over a period.
+LuGre's and Dahl's states obey linear equations under an imposed motion, so their map is affine and the first secant is
+exact.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Imposition:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Tell whether mirrored motions have mirrored forces, tried at random states."""
+        """Tell whether mirrored motions have mirrored forces, tested at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
         pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
@@ -80,14 +80,14 @@ class Imposition:
         return np.vstack([self.force(states), _rows([rates[i] for i in self.inner], self.count)])
 
     def force(self, states: np.ndarray) -> np.ndarray:
-        """Friction force [N] in states of shape (states, ..., count)."""
+        """Return the friction force [N] in states of shape (states, ..., count)."""
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         (force,) = module.outputs(states, modes, 0.0, at_rest, self.values)
         return np.broadcast_to(force, states.shape[1:])
 
     def take(self, numbers: np.ndarray) -> Imposition:
-        """Select the motions with these numbers, any of them as often as wanted."""
+        """Select the numbered motions; a number may occur several times."""
         flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
         return Imposition(flat, len(numbers), self.rtol)
 
@@ -128,7 +128,10 @@ class PeriodicStates:
 
 
 def steady(friction: Imposition) -> PeriodicStates:
-    """Return the periodic steady states; half a period suffices for a symmetric law."""
+    """Return the periodic steady states.
+
+    For a symmetric law half a period suffices.
+    """
     settings = FrequencySettings.current()
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
@@ -148,7 +151,7 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """Return the part of a period that must be followed, and the sign of the states after it."""
+    """Return the part of a period that must be computed, and the sign of the states after it."""
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 
@@ -171,5 +174,5 @@ def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple
     slopes = np.swapaxes((ends[:, 1:] - ends[:, :1]) / width[:, :, None], 1, 2) - np.eye(size)
     fine &= np.all(np.isfinite(slopes), axis=(1, 2)) & np.all(np.isfinite(missed), axis=1)
     slopes[~fine] = -np.eye(size)
-    slopes[np.linalg.det(slopes) == 0] = -np.eye(size)  # the map only shifts: follow it
+    slopes[np.linalg.det(slopes) == 0] = -np.eye(size)  # the map only shifts states: follow the shift
     return np.linalg.solve(slopes, -missed[:, :, None])[:, :, 0], missed, fine

@@ -1,10 +1,9 @@
-"""Compute the friction force on any periodic motion, and its derivative by the motion,
-for multi-harmonic balance.
+"""Compute the friction force on any periodic motion, and its derivative, for multi-harmonic balance.
 
-The law's own state obeys a differential equation under a velocity given at the middles of M equal intervals. The
-implicit midpoint rule makes it a chain that ends where it began. Over half a period of a symmetric motion it ends at
-the mirror image. The force at the middles follows. The rule is of second order, and a fast state settles on its steady
-value however long the intervals are.
+The derivative is by the motion. The law's own state obeys a differential equation under a velocity given at the middles
+of M equal intervals. The implicit midpoint rule makes it a chain that ends where it began. Over half a period of a
+symmetric motion it ends at the mirror image. The force at the middles follows. The rule is of second order, and a fast
+state settles on its steady value however long the intervals are.
 """
 
 from __future__ import annotations
@@ -83,7 +82,7 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
 class FrictionAnswer:
     """Friction force [N] at the middles of intervals (M,), and the parts of its derivative.
 
-    The derivative is by the velocities there: see `along`.
+    The derivative is by the velocities at the middles: see `along`.
     """
 
     force: np.ndarray
@@ -125,9 +124,9 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with velocities [m/s] (M,) in the middle of intervals [s].
+    """Return the friction on a motion with velocities [m/s] (M,) at the middles of intervals [s].
 
-    After the intervals the motion comes back (sign 1) or comes to its mirror image (-1).
+    After the intervals the motion is back at its start (sign 1), or at the mirror image of its start (-1).
     """
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)

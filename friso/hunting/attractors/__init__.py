@@ -27,12 +27,11 @@ BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 
 @dataclass(frozen=True)
 class Target(ArrayRows):
-    """Limit cycles in which stages end unless they come to rest: arrays (count,) or numbers.
+    """Motion that a run must reach to count as hunting: arrays of shape (count,), or numbers.
 
-    A motion that swings by at least `amplitude` [m], half of peak to peak, with a period of at most `period` [s], after
-    the time `lasting` [s] has reached its limit cycle. A motion that swings this far after the time `early` [s] will
-    also do so later. Where attractors were only `observed` in simulations, others nearby may swing as far but less
-    often.
+    A run hunts if, after the time `lasting` [s], it still swings by at least `amplitude` [m], half of peak to peak,
+    with a period of at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
+    Where attractors were only `observed` in simulations, others nearby may swing as far but less often.
     """
 
     amplitude: Any
@@ -72,7 +71,7 @@ class Attractors:
 
     @property
     def target(self) -> Target:
-        """Return the limit cycles in which stages end, shape (count,); NaN for a stage without one."""
+        """Return the motion that marks a run as hunting, shape (count,); NaN for a stage without attractor."""
         settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)
@@ -190,7 +189,10 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
-    """Survey stages without a closed orbit again at a tighter tolerance, whose result counts where both disagree."""
+    """Survey stages without a closed orbit again, at a tighter tolerance.
+
+    Where both surveys disagree, the second one counts.
+    """
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:

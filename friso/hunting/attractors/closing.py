@@ -51,7 +51,7 @@ def close_orbits(
 
 
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
-    """Return which closed orbits, shape (count,), pass through a simpler orbit several times.
+    """Return which closed orbits, shape (count,), only repeat a simpler orbit.
 
     After `fewer` swings such an orbit is back at the state in which the stage sticks, or at its mirror image if `fewer`
     is odd.
@@ -64,9 +64,9 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Return which orbits are the simpler orbit `once` passed several times, shape (count,).
+    """Return which orbits repeat the simpler orbit `once`, `passes` times each; shape (count,).
 
-    They are compared by sticking distance and time; `passes` is the number of times.
+    Orbits are compared by sticking distance and time.
     """
     settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
@@ -95,9 +95,10 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """Return the sample (with a fraction) at which the integrator is balanced after the longest standstill.
+    """Return the index of the sample, with a fraction, at which the integrator is balanced.
 
-    `residuals` are the imbalance of the integrator, `place` [m] the sticking position, both of shape (samples,).
+    If that happens several times, the instant after the longest standstill counts. `residuals` are the imbalance of the
+    integrator, `place` [m] the sticking position, both of shape (samples,).
     """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed

@@ -15,9 +15,9 @@ class Recurrence(ArrayRows):
     """Repetition of runs, arrays of shape (runs,).
 
     `swings` is the smallest number of swings after which a run repeats (0: it does not repeat) and `time` [s] their
-    duration. `better` and `better_time` [s] belong to the most accurate repetition. `size` [m] is the peak-to-peak
-    deviation. `deviation` is the error of the most accurate repetition over `size`, and `earlier` that error some
-    swings before. `mean` [m] is the mean size of single swings.
+    duration. `better` and `better_time` [s] are swings and duration of the most accurate repetition, and `deviation` is
+    its error over `size`, the peak-to-peak deviation [m]. `earlier` is the same error computed some swings earlier.
+    `mean` [m] is the mean size of single swings.
     """
 
     swings: np.ndarray

@@ -1,5 +1,4 @@
-"""Follow stages from many states in rounds, each longer than the last,
-until they rest or repeat themselves."""
+"""Run stages in rounds, each longer than the last, until they rest or repeat themselves."""
 
 from __future__ import annotations
 
@@ -30,8 +29,8 @@ class Pending(ArrayRows):
     """Unfinished runs, one for each stage of the ensemble `stages`.
 
     `states` (runs, kept) are the present states and `durations` [s] the lengths of the next round. `loose` [m] is the
-    distance from which a stage breaks away. `mirrored` marks stages whose mirror-image motions are motions too. Arrays
-    have the shape (runs,) unless stated; `rtol` is the relative tolerance.
+    distance from which a stage breaks away. `mirrored` marks stages for which the mirror image of a motion is a motion
+    too. Arrays have the shape (runs,) unless stated; `rtol` is the relative tolerance.
     """
 
     stages: Ensemble
@@ -113,7 +112,8 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
     )
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
-    rest = completed & standing & (repeats.swings == 0)  # one that repeats itself may do so about home for ever
+    # a run that repeats itself may swing about its reference for ever
+    rest = completed & standing & (repeats.swings == 0)
     ends = Ends(results.ends, completed, away, rest, steps, repeats, values, times)
     return replace(runs, states=results.ends), ends
 
@@ -121,10 +121,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
-    """Return which runs have moved so little for so long that they cannot break away again.
-
-    Shape (runs,).
-    """
+    """Return which runs have moved so little for so long that they cannot break away again, (runs,)."""
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))
@@ -137,8 +134,8 @@ def _stands_still(
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
     """Lengthen the next round of runs.
 
-    A run that does not `swing`, (runs,), gets a round long enough to show that it rests or swings slowly, but short
-    enough that a run which starts to swing does not swing through most of the round.
+    For a run that does not `swing`, (runs,), the round must show that the run rests or swings slowly. It must not be so
+    long that a run which starts to swing does so for most of the round.
     """
     settings = SurveySettings.current()
     least = np.where(

@@ -16,15 +16,16 @@ class SurveySettings(Settings):
     longer, runs cost more and change nothing."""
 
     arrival_time_constants: float = setting(8.0, "time constants")
-    """Waiting time near a stable cycle, in its own time constants. After eight of them 0.03 % of a deviation is left.
-    """
+    """Waiting time near a stable cycle, in time constants of the cycle. After eight of them 0.03 % of a deviation is
+    left."""
 
     early_arrival_share: float = setting(0.25, "")
-    """Time of an early check, as a fraction of the arrival time. Most motions have arrived by then and need not be run
-    on."""
+    """Time of an early check, as a fraction of the arrival time. Most motions have arrived by then, and their runs can
+    end."""
 
     longest_counted_period: float = setting(3.0, "typical periods")
-    """Longest period used for arrival times. A slower cycle would make every motion be followed for as long."""
+    """Longest period used for arrival times. With a slower cycle, every motion would have to be followed for as
+    long."""
 
     closed_orbit_periods: float = setting(6.0, "periods")
     """Shortest wait for a motion near a closed orbit, however fast the orbit attracts."""
@@ -66,7 +67,7 @@ class SurveySettings(Settings):
     last one wastes work."""
 
     typical_distance: float = setting(0.3, "deflections at break-away")
-    """Start distance of the swing that defines the typical period, the unit of all durations."""
+    """Start distance of the swing whose period is the typical period, the unit of all durations."""
 
     quiet_round_factor: float = setting(10.0, "")
     """Length of the next round over the last one, for a run that has not swung yet."""
@@ -193,14 +194,14 @@ class SurveySettings(Settings):
     """Factor by which the error of a repetition must shrink over some swings for the run to approach an orbit."""
 
     orbits_per_round: int = setting(3, "")
-    """Orbits closed per round and stage. More rarely show anything, and each costs as much as a round."""
+    """Orbits closed per round and stage. Further ones rarely show anything, and each costs as much as a round."""
 
     leaving_time_constants: float = setting(15.0, "time constants")
     """Time for which runs are followed near an unstable cycle. Afterwards rounding errors have grown to the size of the
     swing."""
 
     longest_leaving_rounds: float = setting(20.0, "of the last round")
-    """Longest wait for runs to leave an unstable cycle. Near weaker ones a stage is left undecided."""
+    """Longest wait for runs to leave an unstable cycle. A cycle that needs longer leaves its stage undecided."""
 
     steady_swing_share: float = setting(0.8, "")
     """Fraction of the swing that a motion must keep over the last round to count as a cycle."""

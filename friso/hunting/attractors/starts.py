@@ -1,5 +1,4 @@
-"""Choose the states from which a survey starts,
-so that runs reach every attractor of a stage."""
+"""Choose the states from which a survey starts, so that runs reach every attractor of a stage."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ the deflection of the loop by the break-away force."""
 
 
 class Starts:
-    """Runs to be started: initial states (runs, states) and stage numbers (runs,)."""
+    """Runs to be started: initial states (runs, states) and the numbers of their stages (runs,)."""
 
     def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
@@ -49,7 +48,7 @@ class Starts:
         self.states: list[np.ndarray] = []
 
     def take(self, numbers: np.ndarray) -> Starts:
-        """Return empty starts of the stages with these numbers."""
+        """Return the stages with these numbers, without any starts yet."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: np.ndarray | bool) -> None:
@@ -96,9 +95,9 @@ class Starts:
     def remembering(self, thorough: bool) -> None:
         """Add runs of stages with several bristles, bent in the ways in which motions leave them.
 
-        Some runs are released at a distance, with the controller switched on before or only then; some are pushed.
-        Others stick: after being drawn from the reference, after a long way out or back, and after random travels to
-        and fro.
+        Some runs are released at a distance, with the controller switched on before the release or at the release; some
+        are pushed. Others stick: after being drawn from the reference, after a long way out or back, and after random
+        travels to and fro.
         """
         settings = SurveySettings.current()
         units = REMEMBERED[0 if thorough else 1]
@@ -153,9 +152,10 @@ class Starts:
         self.states.append(states)
 
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
-        """Yield the runs ready for their first round, with their stage numbers.
+        """Yield the runs ready for their first round, with the numbers of their stages.
 
-        They come `at_once` or in waves, because a few runs suffice for most stages that hunt.
+        All come in one wave if `at_once`. Otherwise they come in several, because a few runs suffice for most stages
+        that hunt.
         """
         settings = SurveySettings.current()
         if not self.owners:
@@ -175,7 +175,7 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Prepare runs for their first round: set its length, and mark where mirror images are motions too."""
+        """Prepare runs for their first round: set its length, and mark stages with mirror-image motions."""
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

@@ -62,15 +62,15 @@ class Swinging:
 
 
 _Kind = tuple[int, float, float]
-"""A kind of motion: number of the stage, peak to peak [m], and time of repetition [s]."""
+"""A kind of motion: number of the stage, peak-to-peak deviation [m], and time of repetition [s]."""
 
 
 @dataclass(frozen=True)
 class _Beside(ArrayRows):
     """Unstable cycles near which runs repeat, arrays of shape (runs,).
 
-    `cycles` are the numbers of the cycles (-1: none). `offsets` are the relative amounts by which runs swing farther
-    than the cycle (0 without one).
+    `cycles` are the numbers of the cycles (-1: none). `offsets` tell how much farther each run swings than its cycle,
+    relative to the cycle (0 without a cycle).
     """
 
     cycles: np.ndarray
@@ -83,7 +83,7 @@ class _Beside(ArrayRows):
 
     @property
     def leave_first(self) -> np.ndarray:
-        """Choose the outer runs beside each unstable cycle, which leave it first, (runs,).
+        """Choose the runs farthest from each unstable cycle, which leave it first, (runs,).
 
         They stand for all runs on their side of the cycle.
         """
@@ -142,8 +142,8 @@ class Survey:
 
     `attracting` lists the attractors so far. Arrays have the shape (count,). A stage is `unknown` if a run failed or
     was stopped. `slowest` [s] is the time constant of the most weakly unstable cycle (0: none). `left` counts the
-    remaining solver steps of a stage. `rested` and `away` [m] are the farthest starts from which runs came to rest or
-    diverged (0: none).
+    solver steps that a stage may still take. `rested` and `away` [m] are the farthest starts from which runs came to
+    rest or diverged (0: none).
     """
 
     unbounded: np.ndarray
@@ -225,7 +225,8 @@ class Survey:
             if not swinging.size:
                 return
             beside = self._beside(owners, ends)
-            apart = ~ends.swing if number > 0 else (beside.cycles < 0) | runs.stages.remember  # each somewhere else
+            # each run moves elsewhere
+            apart = ~ends.swing if number > 0 else (beside.cycles < 0) | runs.stages.remember
             still = swinging[apart[swinging]]
             moving = np.setdiff1d(swinging, still)
             most = self._affordable(owners, ends)[moving]
@@ -277,7 +278,7 @@ class Survey:
     def _kinds(
         self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
     ) -> np.ndarray:
-        """Return one run of each kind, which is followed for all runs of its kind.
+        """Choose one run of each kind, to be followed in place of all runs of its kind.
 
         Marks a stage unknown if it has more kinds of run than may be followed.
         """
@@ -309,7 +310,7 @@ class Survey:
         """Close an orbit from one run of each kind among the runs numbered `which`."""
         most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
-        pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
+        pairs = runs.mirrored & (repeats.swings == 2)  # a slow approach to a symmetric cycle also repeats in pairs
         tries = (
             (np.where(pairs, 1, 0), repeats.time / 2),
             (repeats.swings, repeats.time),
@@ -331,10 +332,10 @@ class Survey:
             self.note_unstable_cycles(owners[numbers], cycles)
             for kinds_of, which in ((self._attracting_kinds, cycles.attracting), (self._unclosed, ~cycles.attracting)):
                 columns = (column[numbers[which]].tolist() for column in (owners, repeats.size, repeats.time))
-                kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
+                kinds_of += zip(*columns, strict=True)  # the run's numbers, so that later runs are recognised
 
     def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Record runs that swing to the last round as attracted, unless they decay.
+        """Record runs that still swing in the last round as attracted, unless they decay.
 
         A run that may still be leaving an unstable cycle is first followed for as long as that takes.
         """
@@ -362,7 +363,7 @@ class Survey:
         self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
-        """Return which runs repeat so well, with so little recent change, that they will continue.
+        """Return which runs repeat so well, and with so little recent change, that they will go on.
 
         Runs near an unstable cycle are left out.
         """
@@ -386,13 +387,13 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs beside an unstable cycle repeat so exactly that they lie on another cycle."""
+        """Return which runs beside an unstable cycle repeat so exactly that they must lie on another cycle."""
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Add steady runs whose orbit was not closed as observed attractors of their stages."""
+        """Add runs that swing steadily, but whose orbit was not closed, as observed attractors."""
         settings = SurveySettings.current()
         repeats = ends.repeats
         begun = (before == 0) & ~(
@@ -408,7 +409,7 @@ class Survey:
             there_and_back = ends.times[k, 2:] - ends.times[k, :-2]
             swings, time = int(repeats.swings[k]), float(repeats.time[k])
             if swings:
-                turns = 2 if swings % 2 else 1  # it is its mirror image by then
+                turns = 2 if swings % 2 else 1  # after an odd number of swings the motion is mirrored
                 period, swings = turns * time, turns * swings
             elif np.isfinite(there_and_back).any():
                 period, swings = float(np.nanmean(there_and_back)), 2
@@ -423,11 +424,11 @@ class Survey:
 def _kinds(
     owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Choose runs that stand for all: no two alike, and at most `most` for each stage.
+    """Choose one run for each kind of run, at most `most` for each stage.
 
     Returns the numbers of the chosen runs, and of runs of further kinds. `most` is one number, or one for each run.
-    Runs that do not repeat are alike only if they are very close. A few runs `beside` an unstable cycle stand for all
-    on that side.
+    Runs that do not repeat are of one kind only if they are very close. A few runs `beside` an unstable cycle stand for
+    all on that side.
     """
     settings = SurveySettings.current()
     limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))

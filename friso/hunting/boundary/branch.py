@@ -1,8 +1,8 @@
-"""Follow a hunting cycle along a line through the keys, around its folds,
-by pseudo-arclength continuation.
+"""Follow a hunting cycle along a line through the keys, around its folds.
 
-Keller 1977, in Applications of Bifurcation Theory (Academic Press); Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7,
-chapter 10. A place from 0 to 1 measures the line; the distance at which the stage sticks measures the cycle.
+The method is pseudo-arclength continuation: Keller 1977, in Applications of Bifurcation Theory (Academic Press);
+Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7, chapter 10. A place from 0 to 1 measures the line; the distance at which
+the stage sticks measures the cycle.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ END_OF_RANGE = "end of the range"
 """Reason for the end of a branch: it reached the end of the range."""
 
 REACHED = "it reached the end of the requested range"
-"""Reason for the end of a branch: the condition of the walk was met."""
+"""Reason for the end of a branch: the condition for ending the walk was met."""
 
 NO_FARTHER = "it could not be followed farther"
-"""First words of the reason for the end of a branch whose next cycle was not found."""
+"""First words of the reason why a branch ends, if no cycle was found one step farther."""
 
 
 HUNDREDTH = float(np.log(1.01))
-"""Length of a line over which the key changes by a hundredth, if places are logarithms of the key."""
+"""Length of a line over which the key changes by one per cent, if places are logarithms of the key."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class Branch:
 
 
 class Tracer:
-    """Follow one cycle along a line of stages, from place 0 to the `farthest`.
+    """Tracer of one cycle along a line of stages, from place 0 to the `farthest`.
 
-    The line is a family of one. `sign` and `swings` are those of the cycle; None means the fewest swings possible.
-    Steps are `pace` times as long as for drawing a curve and at least `shortest`; the first has the length `first`. The
-    cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length of the line
-    over which the key changes by a hundredth.
+    The line is a family with one member. `sign` and `swings` are those of the cycle; None means the fewest swings
+    possible. Steps are `pace` times as long as for drawing a curve and at least `shortest`; the first has the length
+    `first`. The cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length
+    of the line over which the key changes by one per cent.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle like `solve`, with the nearby cycle's Jacobian alone, if there is one."""
+        """Find the cycle as `solve` does, with the Jacobian of the nearby cycle alone, if it has one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -163,8 +163,8 @@ class Tracer:
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
             if point is None or not near or (ahead < np.cos(settings.branch_turn_per_step) and len(points) > 1):
-                step /= 3  # and along the direction that the branch turned out to have
-                points[-1] = replace(last, jacobians=None)  # which may have led astray
+                step /= 3  # and along the direction estimated from the points
+                points[-1] = replace(last, jacobians=None)  # the old Jacobian may have misled the search
                 if step < self.shortest:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
@@ -188,13 +188,13 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk came to the farthest place, rather than turning back to the first one."""
+        """Tell whether a walk ended at the farthest place, rather than back at the first one."""
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """Return the cycle at the end of the range, in a list that is empty if it is not found.
+        """Return the cycle at the end of the range as a list of one, or an empty list if none was found.
 
-        It lies between the last point inside and the first beyond.
+        It lies between the last point inside the range and the first beyond.
         """
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)

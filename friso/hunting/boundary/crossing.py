@@ -1,5 +1,4 @@
-"""Locate where scattered values pass zero or turn, with an error bound,
-by a cubic through them."""
+"""Locate where scattered values pass zero or turn, with an error bound, by a cubic through them."""
 
 from __future__ import annotations
 
@@ -11,7 +10,7 @@ from friso.hunting.boundary.settings import ContinuationSettings
 
 
 class Crossing(NamedTuple):
-    """A place at which values pass zero, its error bound `reserve`, and the slope there."""
+    """Place at which values pass zero, with its error bound `reserve` and the slope there."""
 
     place: float
     reserve: float
@@ -71,5 +70,5 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
-    """Return the standard deviation of values, (n,), about a cubic through them."""
+    """Return the standard deviation of values, (n,), about a cubic fitted to them."""
     return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

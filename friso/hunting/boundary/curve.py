@@ -1,8 +1,8 @@
 """Follow the edge of hunting in two keys: the curve on which a cycle flips or folds.
 
-Each point is predicted, then corrected on a line across the curve. Along that line the cycle is a branch of its own. At
-a flip the correction moves along the keys. At a fold it moves along the cycle's distance and time, because there is no
-cycle beyond.
+Each point is predicted, then corrected on a line across the curve, along which the cycle forms a branch. At a flip the
+correction moves along the keys. At a fold it moves along the cycle's distance and time, because there is no cycle
+beyond.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from friso.hunting.cycle.find import RTOL
 
 @dataclass(frozen=True)
 class Spot:
-    """Point of a curve on which a cycle changes.
+    """Point of a curve on which a cycle flips or folds.
 
     `at` is its place in the box of the keys, shape (2,), and `special` the located point. `across` is the direction of
     the line on which it was located, shape (2,).
@@ -49,7 +49,7 @@ class Spot:
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve on which cycles of one kind change: its spots in order, and its two ends.
+    """Curve on which cycles of one kind flip or fold: its spots in order, and its two ends.
 
     `sign` is -1 for cycles closed over half a period, 1 for a whole one. Both ends are "closed" for a ring.
     """
@@ -90,7 +90,7 @@ class Expected:
 
 
 class CurveTracer:
-    """Follows the points of a flip, a fold or a torus through the box of two keys."""
+    """Tracer of the points of a flip, a fold or a torus through the box of two keys."""
 
     def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = RTOL) -> None:
         self.space, self.sign, self.rtol = space, sign, rtol
@@ -122,8 +122,8 @@ class CurveTracer:
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
         """Estimate how fast the multiplier changes along the line on which a point is expected.
 
-        The slope across the curve is that of the nearby point; along an oblique line it is smaller. Returns NaN if the
-        line through the nearby point is almost tangent to the curve.
+        The slope across the curve is taken from the point `near`; along an oblique line it is smaller. Returns NaN if
+        the line through that point is almost tangent to the curve.
         """
         if self.kind == "fold":
             return near.special.slope
@@ -178,7 +178,7 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """Find the point at which the curve leaves the box; the list is empty without one."""
+        """Find the point at which the curve leaves the box; return a list of one point, or an empty list."""
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
@@ -192,7 +192,7 @@ class CurveTracer:
         return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
-        """Describe a place in the box: the keys with their values and units."""
+        """Describe a place in the box by the keys with their values and units."""
         values = self.space.values(at[None])
         units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)

@@ -1,5 +1,4 @@
-"""Compute the bifurcation diagram in one key: all branches of cycles,
-and where they stop attracting."""
+"""Compute the bifurcation diagram in one key: all branches of cycles, and where they lose stability."""
 
 from __future__ import annotations
 
@@ -110,7 +109,7 @@ def each_once(
     """Merge special points that are equal within their errors, and keep the first of each group.
 
     Points of several branches also merge if they are close in terms of `hundredth`, the length over which the key
-    changes by a hundredth. Where a limiter chatters, multipliers scatter, and cycles are followed over short,
+    changes by one per cent. Where a limiter chatters, multipliers scatter, and cycles are followed over short,
     overlapping stretches. The error of a merged point includes the difference between the points.
     """
     settings = ContinuationSettings.current()
@@ -130,9 +129,9 @@ def each_once(
 
 
 def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
-    """Tell whether two special points are the same.
+    """Tell whether two special points are the same point.
 
-    They are equal in kind and cycle, and no farther apart than `close` or their errors.
+    They are if kind and cycle are equal, and they are no farther apart than `close` or their errors.
     """
     settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])

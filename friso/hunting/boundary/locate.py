@@ -1,5 +1,7 @@
-"""Locate where a cycle on a branch loses stability: a multiplier passes -1 (flip),
-1 (fold) or the unit circle (torus)."""
+"""Locate where a cycle on a branch loses stability.
+
+A multiplier passes -1 (flip), 1 (fold) or the unit circle (torus).
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,9 @@ ALONG = np.array([1.0, 0.0, 0.0])
 class LocatedPoint:
     """Point at which a branch loses or gains stability.
 
-    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search, and
-    the change at a hundredth of the tolerance. With a limiter that chatters it is the error bound of `smoothed` or
-    `turned`. `slope` is the change of the multiplier along the direction.
+    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search plus
+    the shift when computed at a hundredth of the tolerance. With a limiter that chatters it is the error bound of
+    `smoothed` or `turned`. `slope` is the change of the multiplier along the direction.
     """
 
     kind: Bifurcation
@@ -37,9 +39,9 @@ class LocatedPoint:
     slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
-        """Tell whether a point of the branch lies within the error of this special point.
+        """Tell whether a point of the branch is so near this special point that its stability is unknown.
 
-        Its stability is then unknown.
+        It is if it lies within the error of the special point.
         """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
@@ -54,7 +56,7 @@ def distance_to(kind: Bifurcation, point: Point) -> float:
 
 
 def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
-    """Return the kinds of point that lie between two neighbours on a branch."""
+    """Return the kinds of special point that lie between two neighbours on a branch."""
     if _complex(first) or _complex(second):
         return ("torus",) if (abs(first.multiplier) - 1) * (abs(second.multiplier) - 1) < 0 else ()
     kinds: tuple[Bifurcation, ...] = ("flip", "fold")
@@ -68,7 +70,7 @@ def _complex(point: Point) -> bool:
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """Locate the special point between two neighbours on a branch, with its error; None if it is not reached."""
+    """Locate the special point between two neighbours on a branch, with its error; None if not reached."""
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -98,9 +100,9 @@ def towards(first: Point, second: Point) -> np.ndarray:
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
-    """Search for a special point between two neighbours; return all computed points by their place along the branch.
+    """Search for a special point between two neighbours on a branch.
 
-    Returns None if a cycle cannot be closed.
+    Returns all computed points by their place along the branch, or None if a cycle cannot be closed.
     """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
@@ -109,7 +111,10 @@ def _enclosed(
     points: dict[float, Point] = {0.0: first, length: second}
 
     def distance(place_along: float) -> float:
-        """Return the distance of the multiplier at a place along the branch. Raises Unreached."""
+        """Return how far the multiplier is from its special value at a place along the branch.
+
+        Raises Unreached.
+        """
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
             point = tracer.solve(points[nearest], first.vector + place_along * direction, direction)
@@ -127,11 +132,14 @@ def _enclosed(
 
 
 class Unreached(Exception):
-    """No cycle was found at a place on a branch."""
+    """Error: no cycle was found at a place on a branch."""
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
-    """Return the slope along the branch of the multiplier's signed difference, from the two points nearest to zero."""
+    """Return the slope of the multiplier's signed difference along the branch.
+
+    It is taken from the two points nearest to zero.
+    """
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
@@ -187,8 +195,8 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
 def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
     """Locate a fold by a curve through the places of orbits near a first guess, along a direction.
 
-    Where a limiter chatters, the multiplier belongs to a range of distances and passes 1 beside the fold. The error
-    bound is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
+    Where a limiter chatters, each multiplier is an average over a range of distances, and passes 1 beside the fold. The
+    error bound is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
     """
     orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
@@ -250,7 +258,7 @@ def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
 
 
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
-    """Tell whether an apparent fold of an asymmetric branch is where it meets the symmetric one."""
+    """Tell whether an apparent fold of an asymmetric branch is in fact where it meets the symmetric one."""
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
     stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))

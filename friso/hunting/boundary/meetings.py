@@ -1,8 +1,8 @@
-"""Find where curves of the edge of hunting meet in the plane of two keys: they cross,
-run together, or end on one another.
+"""Find where curves of the edge of hunting meet in the plane of two keys.
 
-Curves are straight between their points, which are at most a twentieth of the ranges apart. A crossing is then refined
-with cycles. That two curves meet says nothing about their cycles: one stage may have both at once.
+They cross, run together, or end on one another. Curves are straight between their points, which are at most a twentieth
+of the ranges apart. A crossing is then refined with cycles. That two curves meet says nothing about their cycles: one
+stage may have both at once.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
-    """Return the points of a curve, (n, 2), with their cycles; a ring repeats its first point."""
+    """Return the points of a curve, (n, 2), with their cycles; a closed ring repeats its first point."""
     again = CLOSED in curve.ends
     spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
     return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots
@@ -151,7 +151,7 @@ def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], 
         place = path[k] + shares[0][k, m] * legs[k]
         pairs = spots[k : k + 2], other_spots[m : m + 2]
         if ring and np.linalg.norm(place - path[0]) < MeetingSettings.current().end_distance:
-            continue  # where it was begun, and followed a little beyond
+            continue  # the start of the ring, which was followed a little beyond its end
         yield _refined(space, curves, numbers, place, pairs, rtol)
 
 

@@ -73,14 +73,14 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
     curves = [curve for of_one, _ in parts for curve in of_one]
     gaps = [gap for _, of_one in parts for gap in of_one]
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
-    undecided = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
+    undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
     if undecided.size:
         others = stages.take(undecided)
         surveyed = attractors(others, rtol=rtol)
         decided[undecided] = surely_surveyed(others, surveyed)
         attracts[undecided] = surveyed.attracts & decided[undecided]
     sides = (_on_grid(allowed[decided & which], nodes) for which in (attracts, ~attracts))
-    for a, b in _changes(*sides):  # of what attracts, whatever it is
+    for a, b in _changes(*sides):  # other attractors, too
         middle = (points[a] + points[b]) / 2
         known_gap = any(np.array_equal(middle, at) for at in gaps)
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
@@ -99,10 +99,10 @@ def _sought(
     rtol: float,
     tally: Tally,
 ) -> tuple[list[Curve], list[np.ndarray]]:
-    """Follow the curves between neighbours of which only the first has the cycle.
+    """Follow the edge of hunting between neighbours of which only the first has the cycle.
 
-    Also returns the places where no curve could be begun. `changing` are pairs of neighbours, and `allowed` the numbers
-    of the valid stages among all points (points, 2).
+    Returns the curves, and the places where no curve could be begun. `changing` are pairs of neighbours, and `allowed`
+    the numbers of the valid stages among all points (points, 2).
     """
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
@@ -112,7 +112,7 @@ def _sought(
             continue
         cycle = cycles.take(np.flatnonzero(allowed == a))
         spot, reached = _first(space, points[a], points[b], cycle, rtol)
-        if reached:  # the neighbour has the cycle too, it was not found there
+        if reached:  # the neighbour has the cycle too, but the search there missed it
             continue
         curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
         if curve:
@@ -170,7 +170,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
-    """Follow a cycle from a stage towards a neighbour until it loses stability or folds.
+    """Follow a cycle from a stage towards a neighbour, to the point where it loses stability or folds.
 
     Returns that point, or None, and whether the cycle reaches the neighbour unchanged.
     """

@@ -109,7 +109,8 @@ class ContinuationSettings(Settings):
     """Most points between two stages of the grid. A branch that winds longer rarely leads to a curve."""
 
     explained_distance: float = setting(0.2, "steps of the grid")
-    """Distance within which a curve explains why two neighbours differ; otherwise another curve is looked for."""
+    """Distance within which a curve explains why two neighbours differ. If none is so near, another curve is looked
+    for."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ class MeetingSettings(Settings):
     """Last step of a refinement, far below the decimals shown."""
 
     crossing_reach: float = setting(0.05, "ranges")
-    """Farthest move of a refinement, the longest step of a curve. Farther off lies another crossing."""
+    """Farthest move of a refinement, equal to the longest step of a curve. Farther off lies another crossing."""
 
     chord_along: float = setting(0.7, "")
     """Least alignment of a step with a curve for the step to show the curve's direction."""

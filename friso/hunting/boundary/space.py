@@ -47,9 +47,9 @@ class KeyRange:
         return (value - self.low) / (self.high - self.low)
 
     def hundredth(self, place: float) -> float:
-        """Return the change of place that changes the value there by a hundredth.
+        """Return the change of place that changes the value there by one per cent.
 
-        If the range contains 0, it is a hundredth of the larger end.
+        If the range contains 0, it is one per cent of the larger end.
         """
         if self.log:
             return float(np.log(1.01) / abs(np.log(self.high / self.low)))
@@ -82,8 +82,8 @@ class Space:
     def form(self) -> Structure:
         """Return the structure shared by all stages in the box.
 
-        It is taken where no key is zero or a whole number. Simpler stages, with a stroke of zero or a whole exponent,
-        use it too.
+        It is that of a stage at which no key is zero or a whole number. Simpler stages, with a stroke of zero or a
+        whole exponent, use it too.
         """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 
@@ -113,16 +113,14 @@ class Space:
         return family
 
     def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
-        """Return a function of place: the length of line over which a key changes by a hundredth.
+        """Return a function of place: the length of line over which a key changes by one per cent.
 
-        It is that of the fastest key. The line runs through the box from an origin (keys,) along a direction (keys,).
+        The key that changes fastest counts. The line runs through the box from an origin (keys,) along a direction
+        (keys,).
         """
 
         def length(place: float) -> float:
-            """Return the distance along the line from `place` over which a key changes by a hundredth.
-
-            The key that changes fastest counts.
-            """
+            """Return the distance along the line from `place` over which the fastest key changes by one per cent."""
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)
             return min(swept.hundredth(float(at)) / abs(float(way)) for swept, at, way in steps if way)
 

@@ -1,4 +1,4 @@
-"""Define the words and numbers on hunting, all on arrays.
+"""Define the terms of hunting as criteria on arrays.
 
 `stage_verdict` has the verdict on a stage, and `run_outcome` the outcome of a run. `settling` has the settling time,
 and `peak_count` the thesis's peak count of a run.

@@ -5,11 +5,11 @@ reference and 0.5 s apart. The tallest are kept first, as MATLAB's findpeaks doe
 cycle, and a cycle below 0.1 mm does not count. `friso.sweep` and `friso.check` call the number `peaks`; there, turning
 points less than 0.25 um from each other are skipped.
 
-A maximum need not be a distinct one. A stage that breaks away halfway back first springs forward by half a micrometre,
-and the rule counts that like the swing itself. With encoder noise, a stage that stands 0.2 mm off its reference has two
+The rule counts every small bump as well. A stage that breaks away halfway back first springs forward by half a
+micrometre, which counts like the swing itself. With encoder noise, a stage that stands 0.2 mm off its reference has two
 peaks a second. Distinct peaks follow the rule too, but the deviation must fall by 1 um on both sides before it rises
 higher. This is our addition, for logs of a drive (`friso rig`, `friso compare`). `friso reproduce` judges the maps of
-the thesis by its own count, without it.
+the thesis by the thesis's own count, without the addition.
 """
 
 from __future__ import annotations
@@ -66,17 +66,15 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     The deviations [m] have the shape (runs, n), the times [s] (n,). From a peak the deviation falls on both sides, so
     the highest sample of a trace that ends on its way up does not count.
     """
-    counting = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)  # what is long before the first that may count is idle
+    # the samples long before the first peak that counts are idle
+    counting = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)
     values = np.ascontiguousarray(deviation[:, counting])
     counts = _until_last_fall(values)
     return distinct_peaks(np.tile(time[counting], (len(values), 1)), values, counts).sum(axis=1)
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """Count the samples of each row up to the end of the last fall by `DISTINCT`.
-
-    It is 0 if nothing falls.
-    """
+    """Count the samples of each row up to the end of the last fall by `DISTINCT`; 0 if nothing falls."""
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
     falls = values - ahead >= DISTINCT
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

@@ -1,14 +1,16 @@
-"""What a run did at its end: it swings, creeps or rests, or it failed. It says nothing on what the stage can do.
+"""State what a run did until its end: it swings, creeps, rests or failed.
 
-- *swings*: over the last quarter the deviation goes to and fro by more than twice the band; it does so again and again
-  (it has a period); and it lasts: it is at least half of what it was over the last half of the run, and since it last
-  turned no more than a period has passed. Of a reference that moves in the last half, the time after it counts alone.
+An outcome says nothing on what the stage can do.
+
+- *swings*: over the last quarter the deviation goes to and fro by more than twice the band. It does so again and again,
+  so it has a period. And it lasts: it is at least half as wide as over the last half of the run, and it turned within
+  the last period. If the reference moves in the last half, only the time after it counts.
 - *rests*: it does not swing, and stays within the band about the reference to the end.
-- *creeps*: neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
+- *creeps*: it does neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
 - *failed*: the run was not completed.
 
-Just one of the four holds. The band is that of the question: `BAND` for sweeps and maps, the position window of a
-specification, what a user calls in position. A swing slower than the run is long looks like creeping.
+Just one of the four holds. The band depends on the question: `BAND` for sweeps and maps, the position window of a
+specification, or the user's band for being in position. A swing slower than the run is long looks like creeping.
 """
 
 from __future__ import annotations
@@ -31,11 +33,11 @@ OUTCOMES = (SWINGS, CREEPS, RESTS, FAILED)
 """The words, the worst first."""
 
 BAND = 1e-5
-"""Band [m] about the reference within which a run of a sweep rests: friso's choice, the wider of
+"""Band [m] about the reference within which a run of a sweep rests: friso's choice, the wider one of
 `friso.hunting.measures.BANDS`."""
 
 LASTING = 0.5
-"""Least ratio of the peak-to-peak deviation over the last quarter to that over the last half of a lasting swing. A
+"""Least ratio of the peak-to-peak deviation over the last quarter to that over the last half, for a swing to last. A
 swing that decays at a tenth of its frequency is gone by then."""
 
 OUTCOME_CRITERION = (
@@ -47,9 +49,9 @@ OUTCOME_CRITERION = (
 class End:
     """State of runs at their end, arrays of shape (runs,).
 
-    `completed`: the run came to its end. `swing` [m] is peak to peak over the last quarter, `earlier` [m] over the last
-    half. `period` [s] is that of the swing (NaN: none). `turned` [s] is the time of the last turn (-inf: never),
-    `outside` [s] the last time outside the band, and `ended` [s] the end of the run.
+    `completed`: the run came to its end. `swing` [m]: peak to peak over the last quarter; `earlier` [m]: over the last
+    half. `period` [s]: period of the swing (NaN: none). `turned` [s]: time of the last turn (-inf: never). `outside`
+    [s]: last time outside the band. `ended` [s]: end of the run.
     """
 
     completed: np.ndarray
@@ -64,7 +66,7 @@ class End:
 def lasts(
     swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING
 ) -> np.ndarray:
-    """Return which deviations still swing by more than twice the `band` [m].
+    """Return which runs still swing by more than twice the `band` [m] without decaying.
 
     The peak-to-peak `swing` [m] must also be at least `lasting` times the `earlier` one [m]. A run that is long enough
     for any transient to decay passes 0 as `earlier`.
@@ -103,7 +105,7 @@ def end_of_traces(
         np.ptp(np.where(time >= last_part(share, ended, corner)[:, None], deviation, deviation[:, -1:]), axis=1)
         for share in (WINDOW, HALF)
     )
-    # All of the trace: the first sample of a part of it would pass for a turn, on a flank too.
+    # The whole trace: the first sample of a part would pass for a turn, even on a flank.
     samples, values = np.full(runs, len(time)), np.ascontiguousarray(deviation)
     turns = scan_turning_points(np.tile(time, (runs, 1)), values, samples, np.nan_to_num(swing), ended, corner)
     done = np.ones(runs, bool) if completed is None else completed

@@ -47,12 +47,12 @@ class Ensemble:
         return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
 
     def take(self, numbers: np.ndarray) -> Ensemble:
-        """Select the stages with these numbers, any of them as often as wanted."""
+        """Select the stages with these numbers; a number may occur several times."""
         flat = {key: value[numbers] if getattr(value, "ndim", 0) else value for key, value in self.flat.items()}
         taken = replace(self, flat=flat, count=len(numbers))
         computed = {name: value[numbers] for name, value in vars(self).items() if name in PER_STAGE}
         shared = {name: value for name, value in vars(self).items() if name in OF_ALL}
-        vars(taken).update(computed | shared)  # what has been computed of the stages already
+        vars(taken).update(computed | shared)  # properties that are computed already
         return taken
 
     @cached_property
@@ -85,18 +85,18 @@ class Ensemble:
 
     @cached_property
     def symmetric(self) -> np.ndarray:
-        """Tell whether mirror images of motions are motions too, (count,), from random states."""
+        """Tell which stages have mirror-image motions, shape (count,), tested on random states."""
         states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
         pairs = ((self.rates(family), self.rates(-family)) for family in states)
         return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
 
     @cached_property
     def values(self) -> list[np.ndarray]:
-        """Return the parameters of each stage, as the generated functions take them."""
+        """Return the parameters of each stage in the order of the generated functions' arguments."""
         return self.kernel.values({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, self.count)
 
     def number(self, name: str) -> np.ndarray:
-        """Return a number of every stage from the generated function `name`, shape (count,).
+        """Return a quantity of every stage by the `name` of its generated function, shape (count,).
 
         "rate" [1/s] is the natural frequency of mass and loop, "breakaway" [N] the largest friction force at rest, and
         "stiffness" [N/m] the proportional stiffness of the loop.
@@ -139,7 +139,7 @@ class Ensemble:
 
     @property
     def integral(self) -> int:
-        """Return the index of the integrator's state, the innermost one of several, which holds the force."""
+        """Return the index of the integrator's state that holds the force: the innermost of several."""
         return self.kernel.having(Role.INTEGRAL)[-1]
 
     @property
@@ -219,9 +219,9 @@ class Ensemble:
     ) -> Results:
         """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`.
 
-        A run begins in the modes that belong to its state. `ends` are states alone, or with the modes if `with_modes`.
-        Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning points are kept
-        only with `least_swing`, because a limiter that chatters makes too many.
+        A run begins in the modes that belong to its state. The `ends` of the result are states alone, or with the modes
+        if `with_modes`. Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning
+        points are kept only with `least_swing`, because a limiter that chatters makes too many.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)

@@ -31,7 +31,7 @@ NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
-"""Reasons for a missing cycle after which one may exist all the same."""
+"""Reasons for not finding a cycle that do not exclude one."""
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
@@ -100,7 +100,10 @@ class Cycles(ArrayRows):
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
-    """Find the symmetric cycle, its own mirror image after half a period, of every stage with symmetric equations."""
+    """Find the symmetric cycle of every stage with symmetric equations.
+
+    It is its own mirror image after half a period.
+    """
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
@@ -140,9 +143,9 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
-    """Find one of the pair of asymmetric cycles of each symmetric stage from the return map, if it has one.
+    """Find one of the pair of asymmetric cycles of each symmetric stage, if it has one.
 
-    The other of the pair is its mirror image.
+    The return map suggests the cycle. The other of the pair is its mirror image.
     """
     settings = OrbitSettings.current()
     cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)
@@ -210,7 +213,7 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     )
     rows, step = np.arange(subset.count), 1 if sign < 0 else 2
     last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
-    last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side that it is followed from
+    last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side on which the orbit begins
     heights = np.abs(np.stack([extrema.values[rows, last], extrema.values[rows, last - step]]))
     times = extrema.times[rows, last] - extrema.times[rows, last - step]
     fine = np.flatnonzero(

@@ -1,4 +1,4 @@
-"""Guess limit cycles: fixed points of the return map over half a period and over a whole one."""
+"""Guess limit cycles: fixed points of the return map over half a period or a whole one."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
     """Guess the cycle over a whole period: a distance to which a stage returns after two landings.
 
-    The distance on the other side differs by a fraction of at least `apart`. Of several guesses the one with the
-    smallest difference is taken if `apart` is 0, else that with the largest. `positive` and `negative` are the maps of
-    stages that stick on the positive and on the negative side.
+    The distance on the other side differs by a fraction of at least `apart`. Of several guesses, the one with the
+    smallest difference is taken if `apart` is 0, else the one with the largest. `positive` and `negative` are the maps
+    of stages that stick on the positive and on the negative side.
     """
     settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
@@ -73,11 +73,11 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """Return the distance that returns to itself, among the distances numbered `goes`, or None.
+    """Return the distance, among those numbered `goes`, from which a stage returns to the same distance.
 
-    If none does, the one that almost does is returned: near a fold both fixed points lie between two points of the map.
-    With `apart`, places near the symmetric fixed point are left out, because the map almost returns there whenever a
-    flip is near.
+    If there is none, the distance that almost returns is taken: near a fold both fixed points lie between two points of
+    the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
+    whenever a flip is near. Returns None without a guess.
     """
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0
@@ -90,7 +90,7 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
     if not goes.size or change.min() >= OrbitSettings.current().almost_return_log:
         return None
     nearest = goes[change.argmin()]
-    towards = nearest + int(side[nearest])  # the symmetric fixed point
+    towards = nearest + int(side[nearest])  # the side on which the symmetric fixed point lies
     return float(start[nearest]) if not apart or side[towards] == side[nearest] else None
 
 
@@ -100,7 +100,10 @@ def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the last neighbouring distances between which a function falls through zero; NaN without such a pair."""
+    """Return the last two neighbouring distances between which a function falls through zero.
+
+    Both are NaN if there are none.
+    """
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     rows = np.arange(len(rise))

@@ -1,5 +1,4 @@
-"""Find lasting motions near an unstable cycle, of any number of swings,
-from the return map around it."""
+"""Find lasting motions near an unstable cycle, of any number of swings, from the return map around it."""
 
 from __future__ import annotations
 
@@ -17,9 +16,9 @@ from friso.hunting.settings import ToleranceSettings
 def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
     """Return distances [m] at which stages stick in lasting motions beside an unstable cycle.
 
-    The return map keeps these motions within a few per cent of the cycle. The shape is (count, KEPT), NaN for no
-    motion. The map is interpolated, so a simulation has to decide whether the motions are attractors. The result is NaN
-    where a limiter chatters, because the map is too rough.
+    The return map keeps these motions within a few per cent of the cycle. The shape is (count, n), NaN for no motion.
+    The map is interpolated, so a simulation has to decide whether the motions are attractors. The result is NaN where a
+    limiter chatters, because the map is too rough.
     """
     settings = OrbitSettings.current()
     tolerances = ToleranceSettings.current()
@@ -44,7 +43,7 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
 
 
 def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """Measure how far stages swing [m] from beside their orbits, (count, runs, RETURNS).
+    """Measure how far stages swing [m] when started beside their orbits, (count, runs, returns).
 
     Runs first span the range, with the orbit in the middle. More runs follow where, on either side, the next return
     leaves the range.
@@ -62,10 +61,10 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the deviations, ascending, at which a map keeps motions within its range after many returns.
+    """Return the deviations that motions still have after many returns within the range of a map.
 
-    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). A motion that only ever
-    grew is left out: near a multiplier of 1 or -1 it merely leaves slowly.
+    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). The result ascends. A
+    motion that grew at every return is left out: near a multiplier of 1 or -1 it merely leaves slowly.
     """
     settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)

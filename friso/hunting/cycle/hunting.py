@@ -41,7 +41,7 @@ FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a h
 """Reason given when simulations at two tolerances contradict each other."""
 
 REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
-"""Reason given when the search through the bandwidths contradicts the survey of the stage itself."""
+"""Reason given when the search through the bandwidths contradicts the survey at the stage's own bandwidth."""
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Reason why a stage with dither is not searched for cycles, although it may hunt."""
@@ -72,7 +72,7 @@ MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: som
 OUTER_INTEGRALS = (
     "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
 )
-"""Reason given when starts vary the integral of the inner loop only."""
+"""Reason given when the survey varied only the integral of the inner loop."""
 
 SMALL_CYCLES = (
     "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
@@ -83,7 +83,7 @@ NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller 
 """Reason given when cycles within a narrow backlash may be smaller than the survey covers."""
 
 STIFF_BRISTLES = "bristles give way by so little that runs do not resolve how friction falls as they break away"
-"""Reason given when bristles bend by less than runs resolve."""
+"""Reason given when bristles bend by less than runs can resolve."""
 
 RESOLVED_BRISTLES = 10 * TIGHT
 """Smallest deflection of bristles, in deflections of the loop, that runs resolve at the tightest tolerance of a survey.
@@ -100,10 +100,10 @@ class Cycle:
       in a period.
     - `multipliers`, shape (states - 1,): Floquet multipliers, the largest first, without the trivial one along the
       cycle.
-    - `slope`: slope of the return map over 1 % of the amplitude (NaN where such stages do not come back).
+    - `slope`: slope of the return map over 1 % of the amplitude (NaN if stages started there do not come back).
     - `multiplier`: the number that decides stability: the slope with a stroke limiter, which may chatter, else the
       largest Floquet multiplier (its modulus if complex).
-    - `growth`: the multiplier by an independent simulation beside the cycle (NaN if that leaves too fast).
+    - `growth`: the multiplier measured by an independent simulation beside the cycle (NaN if it leaves too fast).
     - `residual`: gap at which the orbit closes, relative to the magnitudes of its states.
     - `signals`: one period in time, from the instant at which the stage sticks.
     """
@@ -197,7 +197,10 @@ class Hunting:
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Return why a stage cannot hunt whatever its numbers, or why it is not searched (`DITHERS`); "" if it may hunt."""
+    """Return why a stage cannot hunt whatever its numbers, or why it is not searched; "" if it may hunt.
+
+    With dither (`DITHERS`) no cycle is searched for.
+    """
     return why_not(structure(stage.flat()))
 
 
@@ -253,8 +256,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
     """Return for which stages the attractors are certain, shape (count,).
 
-    The survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed (None), and
-    are certain if no other swing lasts.
+    They are if the survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed
+    (None), and are certain if no other swing lasts.
     """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
@@ -262,7 +265,10 @@ def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
 
 
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
-    """Return why something may attract stages beyond the reach of a survey, words (count,); "" if nothing can."""
+    """Return why something may attract stages beyond the reach of a survey, texts (count,).
+
+    A text is "" if nothing can.
+    """
     why = np.full(stages.count, "", dtype=object)
     far, farther = far_beyond_a_limit(stages), np.zeros(stages.count, bool)
     if far is not None:
@@ -297,8 +303,8 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    A cycle fed by the fall of friction has an amplitude in a certain ratio to this fall (`feeding_ratio_range`). It is
-    stable where friction falls more slowly than cycles grow.
+    A cycle fed by friction that falls with speed has an amplitude in a certain ratio to this fall
+    (`feeding_ratio_range`). It is stable where friction falls more slowly than cycles grow.
     """
     settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
@@ -309,7 +315,7 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Return which of the stages, all with friction, may have cycles smaller than the survey covers, (count,)."""
+    """Apply `small_cycles_possible` to stages that all have friction, (count,)."""
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
@@ -326,8 +332,9 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     friction = stages.take(numbers).steady_friction(np.hstack([speeds, -speeds]).ravel())
     if friction is None:
         return np.ones(stages.count, bool)
-    force = np.abs(friction).reshape(stages.count, 2, -1)  # forward, and back
-    slowest, sticks = force[:, :, :1], bool(stages.kernel.having(Role.BRISTLE))  # other laws creep before they slide
+    force = np.abs(friction).reshape(stages.count, 2, -1)  # forward and backward
+    # laws without bristles creep before they slide
+    slowest, sticks = force[:, :, :1], bool(stages.kernel.having(Role.BRISTLE))
     mean = slowest.mean(axis=1, keepdims=True)
     at_rest = stages.friction_at_rest[:, None, None] * slowest / mean if sticks else 0.0
     falls = (np.maximum.accumulate(np.maximum(force, at_rest), axis=2) - force) / breakaway[:, None]
@@ -370,7 +377,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
     small = (np.abs(before) < settings.linear_deviation_share) & (
         np.abs(after) < settings.linear_deviation_share
-    )  # and no NaN
+    )  # NaN counts as not small
     if np.count_nonzero(small) < 2:
         return np.nan
     return float(before[small] @ after[small] / (before[small] @ before[small]))

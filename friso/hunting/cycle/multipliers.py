@@ -20,9 +20,9 @@ from friso.hunting.settings import ToleranceSettings
 class Multipliers:
     """Floquet multipliers of orbits, without the trivial one along the cycle.
 
-    `local` (count, states - 1) has the largest first. `direction` (count, states) belongs to the first, scaled to a
-    position of 1. `slope` (count,) is the macroscopic slope of the return map along that direction, NaN where no
-    limiter chatters. `high` and `low` [m] (count,) are the extremes of the position on the orbit.
+    `local` (count, states - 1) has the largest first. `direction` (count, states) is the eigenvector of the first,
+    scaled to a position of 1. `slope` (count,) is the slope of the return map along that direction over a finite range,
+    NaN where no limiter chatters. `high` and `low` [m] (count,) are the extremes of the position on the orbit.
     """
 
     local: np.ndarray
@@ -54,16 +54,16 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
     values, vectors = np.linalg.eig(np.where(finite, sections, 0.0))
     values = np.where(finite[:, :, 0], values, np.nan)
     order = np.argsort(-np.abs(values), axis=1)
-    values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last is that of the phase, which is zero
+    values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last multiplier belongs to the phase and is zero
     first = np.take_along_axis(vectors, order[:, None, :1], axis=2)[:, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         return values, np.real(first / first[:, stages.sticking, None])
 
 
 def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """Return the slope of the return map from a small range about the orbits, shape (count,).
+    """Return the slope of the return map over a small range about the orbits, shape (count,).
 
-    The starts lie along a direction (count, states); a straight line is fitted to the returns.
+    Runs start along a direction (count, states); a straight line is fitted to their returns.
     """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
@@ -81,7 +81,8 @@ def _straight(pairs: np.ndarray) -> float:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T
     earlier, later = np.triu_indices(len(first), 1)
-    slope = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))  # that of Theil and Sen
+    # median of all slopes, after Theil and Sen
+    slope = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))
     near = np.abs(second - slope * first) < settings.near_return_share * np.ptp(first)
     if np.count_nonzero(near) < settings.least_slope_runs:
         return np.nan

@@ -28,7 +28,7 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
     """Return stuck states as `stuck` does, with the bristles bent by slow travels of the masses.
 
     The `travels` [m], each of shape (count,), follow one another, and bend bristles no farther than break-away does.
-    With several bristles some stick while others slip, so that the distance alone does not decide what follows.
+    With several bristles some may stick while others slip, so that the distance alone does not decide what follows.
     """
     states, bristles = stuck(stages, displacement), stages.kernel.having(Role.BRISTLE)
     most = stages.scales[:, bristles]
@@ -47,8 +47,8 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Return the time [s] in which the integrator of a sticking stage winds up to break-away, (count,).
 
-    If the integrator pauses, it is a time in which the loop moves. It is never longer than an integrator with a leak
-    winds.
+    If the integrator pauses, it is a time in which the loop moves. It is at most the time that an integrator with a
+    leak takes.
     """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)

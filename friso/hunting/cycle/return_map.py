@@ -1,5 +1,7 @@
-"""Compute the return map of hunting: from the sticking distance to how far a stage swings to
-the other side."""
+"""Compute the return map of hunting.
+
+It takes the sticking distance to how far a stage swings to the other side.
+"""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class OrbitSettings(Settings):
     """Largest change of the last returns of a simulation that has reached a cycle."""
 
     refined_distances: int = setting(8, "")
-    """Distances between which a fixed point of the map is bracketed for Newton's method."""
+    """Distances on which a fixed point of the map is narrowed down before Newton's method begins."""
 
     unwinding_wait_share: float = setting(0.4, "waits")
     """Time from landing until the actuator only balances constant forces, as a fraction of the wait."""
@@ -53,7 +53,7 @@ class OrbitSettings(Settings):
     """Runs added at a break of the map. An attractor beside the break may be as narrow as a step."""
 
     held_returns: int = setting(3, "returns")
-    """Returns of each run. The map is then also known at the distances to which it leads."""
+    """Returns of each run. They also give the map at the distances to which it leads."""
 
     nearest_start_share: float = setting(1e-3, "of the distance")
     """Start nearest to a cycle. Closer to it, rounding decides where a run goes."""
@@ -62,7 +62,7 @@ class OrbitSettings(Settings):
     """Iterations of the map beside a cycle, because slow motions need hundreds of returns."""
 
     held_starts: int = setting(12, "")
-    """Most starts returned. Further starts repeat much the same motions."""
+    """Most starts returned. Further starts give much the same motions."""
 
     beside_cycle_share: float = setting(2e-3, "of the distance")
     """Start of a simulation beside a cycle. Closer to it, rounding decides where the run goes."""
@@ -84,10 +84,10 @@ class OrbitSettings(Settings):
     larger."""
 
     fastest_friction_speed: float = setting(1e7, "speeds of small swings")
-    """Highest speed at which friction curves are examined. Beyond it they no longer fall."""
+    """Highest speed at which friction curves are examined. At higher speeds friction no longer falls."""
 
     friction_speeds: int = setting(300, "")
-    """Speeds at which friction curves are examined: thirty per decade, because a fall of friction is broader."""
+    """Speeds at which friction curves are examined: thirty per decade, narrower than any fall of friction."""
 
     least_certain_swing: float = setting(0.001, "deflections at break-away")
     """Smallest swing that counts as resolved. Runs resolve smaller cycles badly and may miss them."""

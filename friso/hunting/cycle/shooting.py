@@ -50,10 +50,11 @@ class Orbits(ArrayRows):
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Integrate orbits from states (count, states) for times [s] (count,), with a deviation along every state.
+    """Integrate orbits from states (count, states) for times [s] (count,), with their derivatives.
 
-    One deviation is computed rather than run, along the state with the largest rate: the flow carries the rates at the
-    start to those at the end. Where modes remember, a state alone does not give the rates, so all deviations are run.
+    One deviation runs along each state but the one with the largest rate: that derivative follows from the others,
+    because the flow carries the rates at the start to those at the end. With modes that remember, a state alone does
+    not give the rates, so all deviations are run.
     """
     count, size = states.shape
     rows, before = np.arange(count)[:, None], stages.rates(states)
@@ -92,7 +93,7 @@ def close(
     on a stage at rest.
 
     A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's derivative
-    changes from one nanometre to the next, so the last Jacobian from farther away is kept.
+    changes from one nanometre to the next, so the last Jacobian, from farther away, is kept.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
@@ -100,10 +101,10 @@ def close(
 
 @dataclass(frozen=True)
 class Border:
-    """A plane for each branch on which its next orbit is sought, so that the branch can be followed around folds.
+    """For each branch, a plane on which its next orbit must lie.
 
-    The space is place along the branch, log distance [m] and log time [s]. An orbit lies on the plane if normal @
-    (place, log distance, log time) = level; shapes (count, 3) and (count,).
+    With it a branch can be followed around folds. The space is place along the branch, log distance [m] and log time
+    [s]. An orbit lies on the plane if normal @ (place, log distance, log time) = level; shapes (count, 3) and (count,).
     """
 
     normal: np.ndarray
@@ -111,7 +112,7 @@ class Border:
 
 
 Family = Callable[[np.ndarray, np.ndarray], Ensemble]
-"""Stages that depend on one number each, their place, as a function of stage numbers (count,) and places (count,)."""
+"""Stages as a function of their numbers (count,) and of one place each (count,)."""
 
 
 class Followed(NamedTuple):
@@ -139,7 +140,7 @@ def close_along(
 ) -> Followed:
     """Close orbits as `close` does, while stages move along lines until each orbit lies on its border.
 
-    The orbits start from states and times [s]. The method passes folds, beyond which there is no orbit at a place. With
+    The orbits start from states and times [s]. The method passes folds, where no orbit exists at a place beyond. With
     `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians may
     belong to another line through the keys: further steps learn the derivative along this line.
     """
@@ -209,7 +210,8 @@ class _Shooting:
         misses = ends - states
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
         self.serves[which] = renew | (gaps < np.maximum(settings.old_jacobian_share * self.gaps[which], self.finest))
-        kept = self.serves[which] | self.chatters  # the others are shot once more from where they are
+        # orbits whose old Jacobian no longer serves are shot again from where they are
+        kept = self.serves[which] | self.chatters
         self._keep_best(which[kept], gaps[kept])
         residual = self._residual(which, stages)
         scales = stages.scales
@@ -248,7 +250,7 @@ class _Shooting:
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a Newton step of limited length for one orbit, and return it.
+        """Take a Newton step of limited length for one orbit; return the step.
 
         `scales` are the magnitudes of the states.
         """
@@ -289,7 +291,7 @@ class _Following(_Shooting):
             self.finest = tolerances.followed_gap
         else:
             self.limit = tolerances.followed_gap
-        # of each orbit its last step, and what that was to bring to zero
+        # for each orbit, its last step and the residual that the step should have removed
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
     def begin_with(self, jacobians: np.ndarray) -> None:
@@ -302,11 +304,11 @@ class _Following(_Shooting):
         for k in range(len(which)):
             self.inverses[k] = _inverse(self.jacobians[k])
             self._step(k, np.concatenate([gaps, residual[k]]), stages.sticking, scales[k])
-            self.latest[k] = None  # its gaps are not known
+            self.latest[k] = None  # its residual is not computed
         self.serves[:] = True
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a step after updating the Jacobian by the last one.
+        """Update the Jacobian by the last step, then take the next one.
 
         Broyden 1965, doi:10.2307/2003941.
         """
@@ -355,7 +357,7 @@ class _Following(_Shooting):
         return self.jacobians[which]
 
     def _beside(self, which: np.ndarray) -> np.ndarray:
-        """Run the orbits with their stages slightly before and after their places on the lines.
+        """Run the orbits of stages slightly before and after their places on the lines.
 
         Returns the ends and the phase errors, shape (2, orbits, states + 1).
         """

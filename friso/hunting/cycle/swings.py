@@ -22,8 +22,8 @@ class Swings:
 def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
     """Return the first `most` swings of stages that start at rest; a failed run has none.
 
-    Stages start from states (count, states) and run for durations [s] (count,). An extremum counts once the way back is
-    one leg long, or the run is over.
+    Stages start from states (count, states) and run for durations [s] (count,). An extremum counts once the stage has
+    come back by one leg, or the run is over.
     """
     position = starts[:, stages.kernel.position]
     legs = OrbitSettings.current().swing_leg_share * np.abs(position)
@@ -59,7 +59,7 @@ def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.n
     runs = len(values)
     rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
-    count, sign = np.zeros(runs, np.int64), side.copy()  # sign: the side on which the next extremum lies
+    count, sign = np.zeros(runs, np.int64), side.copy()  # sign: side of the next extremum
     best, when = values[:, 0].copy(), times[:, 0].copy()
     for value, time in zip(values.T[1:], times.T[1:], strict=True):
         turned = (sign * (best - value) >= least) & (count <= most)

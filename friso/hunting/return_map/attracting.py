@@ -1,4 +1,7 @@
-"""Find limit cycles of stages by their return maps: follow each attractor of a map by a run, and close an orbit."""
+"""Find limit cycles of stages by their return maps.
+
+Each attractor of a map is followed by a run, from which an orbit is closed.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,7 @@ class MapSurvey:
 
 @dataclass(frozen=True)
 class _Proposal:
-    """An attractor of a stage's map, and the run that is continued near it."""
+    """Attractor of a stage's map, and the run that will be continued near it."""
 
     stage: int
     attractor: MapAttractor
@@ -104,7 +107,10 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """Return attractors of maps that are not closed as orbits yet, if a run near them can be continued."""
+    """Return the attractors of maps that are not closed as orbits yet.
+
+    Those without a run near them that can be continued are left out.
+    """
     lengths = mapped.stages.length
 
     def is_any(new: _Proposal, closed: list[Swinging], exactly: bool) -> bool:
@@ -119,7 +125,10 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """Return the attractors of all maps, each with the run of its basin that ended nearest to it."""
+    """Return the attractors of all maps.
+
+    Each comes with the run of its basin that ended nearest to it.
+    """
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):
         for attractor in landing_map.attractors:
@@ -136,17 +145,17 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 
 
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
-    """Tell whether an attractor of a map is a given closed cycle of its stage, by size and number of landings.
+    """Tell whether an attractor of a map is a given closed cycle of its stage.
 
-    With `exactly`, the numbers of landings must be equal; otherwise one may be a multiple. `length` [m] is the
-    deflection of the loop by the break-away force.
+    They are compared by size and by number of landings. With `exactly`, the numbers of landings must be equal;
+    otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away force.
     """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
         return False
     if not attractor.periodic:
         size = float(distances.mean())
-    elif len(distances) % 2:  # it lands everywhere on either side
+    elif len(distances) % 2:  # every landing occurs on either side
         size = float(distances.max())
     else:
         size = float(distances[::2].max() + distances[1::2].max()) / 2
@@ -180,7 +189,7 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 
 
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
-    """Return the smallest number of swings, at least `least`, after which a run's last landings repeat; 0 if none.
+    """Return after how many swings, at least `least`, a run's last landings repeat; 0 if they do not.
 
     `path` has the shape (landings,).
     """

@@ -19,10 +19,10 @@ PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     """Return for which stages runs land where the map predicts, in the shape of `numbers`.
 
-    Runs begin stuck at three distances from which the stage rests, at three from which it swings on, and in the widest
-    gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a hundredth of
-    it. From the second landing on, every landing must lie within the allowed scatter of its prediction from the one
-    before.
+    Runs begin stuck at three distances from which the stage rests, at three from which it keeps swinging, and in the
+    widest gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a
+    hundredth of it. The prediction for a landing starts from the landing before. From the second landing on, every
+    landing must lie within the allowed scatter of its prediction.
     """
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
@@ -50,7 +50,7 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
     return np.append(starts[chosen], between)
 
 
-@np.errstate(all="ignore")  # landings that are not there are NaN
+@np.errstate(all="ignore")  # missing landings are NaN
 def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray, rtol: float) -> np.ndarray:
     """Return which runs, stuck at first at `starts`, land where the maps predict, shape (runs,)."""
     settings = ReturnMapSettings.current()

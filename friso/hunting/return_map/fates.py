@@ -1,4 +1,7 @@
-"""Decide which motions swing for ever: a run shows where they land, and the return map what follows."""
+"""Decide which motions swing for ever.
+
+A run shows where a motion lands, and the return map predicts what follows.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,10 @@ def motions_go_on(
 
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs swing for ever, by where they land, and for which this is known, (runs,)."""
+    """Return which runs swing for ever, and for which this is known, both (runs,).
+
+    The places where the runs land decide.
+    """
     settings = ReturnMapSettings.current()
     count = len(starts)
     ends, decided, left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)

@@ -1,5 +1,4 @@
-"""Interpolate the return map of a stage, from one landing to the next,
-and iterate it to its attractors."""
+"""Interpolate the return map of a stage, from one landing to the next, and iterate it to attractors."""
 
 from __future__ import annotations
 
@@ -16,19 +15,19 @@ from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import ReturnMapSettings
 
 OTHER_SIDE = 1e3
-"""Shift of the coordinate of places on the negative side."""
+"""Shift of the map coordinate for landings on the negative side."""
 
 REST = -1e6
-"""Coordinate of a stage that rests, or has diverged."""
+"""Map coordinate that stands for a stage that rests, or has diverged."""
 
 
 @dataclass(frozen=True)
 class MapAttractor:
-    """An attractor of a return map.
+    """Attractor of a return map.
 
     `distances`, shape (swings,), are signed distances of successive landings, in deflections of the loop by the
-    break-away force. `basin` (points,) are the points of the map that lead to the attractor. It is a cycle of that many
-    swings if `periodic`; otherwise the distances are the last landings of an irregular motion.
+    break-away force. `basin` (points,) are the points of the map that lead to the attractor. A `periodic` attractor is
+    a cycle of as many swings; otherwise the distances are the last landings of an irregular motion.
     """
 
     distances: np.ndarray
@@ -100,7 +99,7 @@ class LandingMap:
 
     @cached_property
     def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return straight pieces of the map over places: begin, value at place 0, and slope.
+        """Return the straight pieces of the map over places: begin, value at place 0, and slope.
 
         Places (see `_place`) ascend. Between two points the logarithm of distance is linear. Where the map breaks off,
         each half has the gain of the nearer point.
@@ -135,7 +134,8 @@ class LandingMap:
                         continue
                 beside(low, low, one)
                 beside((low + high) / 2, high, two)
-            if len(points) and first < len(begins) and begins[first] == places[0]:  # the same line a little nearer
+            # the first line continues a little nearer to home
+            if len(points) and first < len(begins) and begins[first] == places[0]:
                 begins[first] -= settings.scatter_range_log
             if len(points):
                 beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
@@ -201,7 +201,10 @@ class LandingMap:
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
 
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
-        """Yield each attractor once, from paths of places on the attractors, shape (points, landings)."""
+        """Yield each attractor once, from paths that end on attractors.
+
+        Paths hold places, shape (points, landings).
+        """
         settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
         while left.any():
@@ -215,9 +218,9 @@ class LandingMap:
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
-        """Return the growth of a small deviation from an attractor per repetition, by the map, without sign.
+        """Return the growth of a small deviation from an attractor per repetition, without sign.
 
-        It is infinite if the attractor does not repeat.
+        It is read off the map, and infinite if the attractor does not repeat.
         """
         if not attractor.periodic:
             return np.inf
@@ -226,7 +229,7 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """Return the largest relative error of a landing predicted by its neighbours, and the distance of that landing.
+        """Return the largest relative error of a landing predicted by its neighbours, and its distance.
 
         The error is infinite if a stage rests between two landings that continue alike, or the reverse. It is 0 if no
         three points are close together. Only points whose next landing is at more than half of their distance count.
@@ -265,10 +268,11 @@ def _distance(places: np.ndarray) -> np.ndarray:
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out landings beyond `farthest_sticking` from which a run comes back, and count the remaining ones.
+    """Leave out landings beyond `farthest_sticking` from which a run comes back.
 
-    From so far a stage passes its reference without sticking, so distance alone does not decide what follows.
-    `distances` have the shape (runs, landings), the start first; the count excludes the start.
+    Returns the remaining distances, and how many there are in each run, without the start. From so far a stage passes
+    its reference without sticking, so distance alone does not decide what follows. `distances` have the shape (runs,
+    landings), the start first.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
     near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
@@ -280,7 +284,7 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return the smallest difference, (points,), between places of paths and those one cycle earlier.
+    """Return how closely paths repeat, (points,): the least difference from places one cycle earlier.
 
     Paths have the shape (points, landings).
     """
@@ -301,7 +305,7 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Return which paths spread over the range of the first one, shape (points,)."""
+    """Return which paths spread over the same range as the first one, shape (points,)."""
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
         paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share

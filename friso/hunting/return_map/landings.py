@@ -1,4 +1,7 @@
-"""Find the landings of stages: the distances from the reference at which a stage turns, swing after swing."""
+"""Find the landings of stages.
+
+A landing is the distance from the reference at which a stage turns, swing after swing.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ class Landings(ArrayRows):
         return Landings(*(np.concatenate([*pair]) for pair in pairs))
 
     def _with(self, room: int) -> Landings:
-        """Return the runs with room for so many landings."""
+        """Return the runs with room for `room` landings."""
         wider = ((0, 0), (0, room - self.distances.shape[1]))
         distances, times = (np.pad(part, wider, constant_values=np.nan) for part in (self.distances, self.times))
         return replace(self, distances=distances, times=times)
@@ -98,15 +101,15 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
         left = left[fine & ~rest[left] & ((landed[left] < most) | unfinished)]
         if not left.size:
             break
-    lost[left] = True  # they have not landed as often as asked in so many rounds
+    lost[left] = True  # they have not landed often enough in the allowed rounds
     return Landings(where, when, landed, states, rest, away, lost)
 
 
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return each run's farthest places [m] on alternating sides, their times [s], and their number.
+    """Find the landings of runs: the farthest places [m] on alternating sides.
 
-    Places and times have the shape (runs, landings), the start first; the number excludes the start, (runs,). `values`
-    and `times` have the shape (runs, places), NaN for no place.
+    Returns the places, their times [s], and their number. Places and times have the shape (runs, landings), the start
+    first; the number excludes the start, (runs,). `values` and `times` have the shape (runs, places), NaN for no place.
     """
     count = len(values)
     rows = np.arange(count)

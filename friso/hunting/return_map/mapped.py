@@ -1,5 +1,7 @@
-"""Sample the return maps of many stages at once: choose where runs begin,
-and add runs where a map is too coarse."""
+"""Sample the return maps of many stages at once.
+
+The module chooses where runs begin, and adds runs where a map is too coarse.
+"""
 
 from __future__ import annotations
 
@@ -17,15 +19,14 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.stage.controllers import FORCE_LIMIT
 
 NEAR_DISTANCES = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
-"""Nearer distances at which stages are stuck at first, in deflections of the loop by the break-away force."""
+"""Start distances near the reference, in deflections of the loop by the break-away force."""
 
 FAR_DISTANCES = np.geomspace(5.0, 300.0, 6)
-"""More distances, in units of the deflection of the loop by the break-away force, from which a stage passes its
-reference without sticking at first."""
+"""Start distances, in deflections of the loop by the break-away force, from which a stage passes its reference without
+sticking at first."""
 
 LIMITED_DISTANCES = np.geomspace(600.0, 30000.0, 6)
-"""Still farther distances, in units of the deflection of the loop by the break-away force, from which stages with a
-force limit begin."""
+"""Start distances of stages with a force limit, in deflections of the loop by the break-away force."""
 
 
 WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
@@ -34,11 +35,11 @@ WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
 
 @dataclass(frozen=True)
 class Mapped:
-    """Stages and runs that sample their return maps.
+    """Stages with the runs that sample their return maps.
 
     Each run belongs to the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in
-    deflections of the loop by the break-away force. NaN marks a run that goes on from another; that other one is
-    `continued` (runs,). `landings` are the landings of all runs, to the relative tolerance `rtol`.
+    deflections of the loop by the break-away force; NaN marks a run that goes on from the run numbered `continued`
+    (runs,). `landings` are the landings of all runs, to the relative tolerance `rtol`.
     """
 
     stages: Ensemble
@@ -61,7 +62,7 @@ class Mapped:
 
     @property
     def attracts(self) -> np.ndarray:
-        """Return on which maps landings continue for ever, shape (count,)."""
+        """Return which stages have a map on which landings continue for ever, shape (count,)."""
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
@@ -94,9 +95,9 @@ class Mapped:
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
     def gone_on(self, runs: np.ndarray, most: int) -> Mapped:
-        """Continue the runs with these indices from their last landing, for up to `most` landings.
+        """Continue the numbered runs from their last landing, for up to `most` landings.
 
-        Returns a sampling that contains the old and the continued runs.
+        Returns the old and the continued runs.
         """
         owners, states = self.owners[runs], self.landings.ends[runs]
         more = find_landings(self.stages.take(owners), states, most, self.rtol)
@@ -107,7 +108,7 @@ class Mapped:
         return before.joined(owners, np.full(len(runs), np.nan), more)
 
     def finer(self) -> Mapped:
-        """Add runs in the gaps of maps that are not resolved yet."""
+        """Add runs in the gaps of maps that are still too coarse."""
         wanted = [self._wanted(k) for k in range(self.stages.count)]
         owners = np.repeat(np.arange(self.stages.count), [len(starts) for starts in wanted])
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
@@ -154,15 +155,15 @@ def map_stages(
 
 
 def remembered(mapped: Mapped, stage: int) -> str:
-    """Return the name of the state that best explains why runs with equal landings continue differently.
+    """Return the state that best explains why runs with equal landings continue differently.
 
-    The state carries the stage's past. Returns "" if no landings show one.
+    That state, given by its name, carries the stage's past. Returns "" if no landings show one.
     """
     settings = ReturnMapSettings.current()
     landing_map = mapped.maps[stage]
     _, place = landing_map.scatter
     with np.errstate(all="ignore"):
-        apart = np.log(landing_map.before / place)  # NaN on the other side, and where nothing scatters
+        apart = np.log(landing_map.before / place)  # NaN on the other side, or if nothing scatters
     near = np.flatnonzero(
         (np.abs(apart) < settings.coarse_gap_log) & landing_map.final & np.isfinite(landing_map.after)
     )
@@ -173,7 +174,7 @@ def remembered(mapped: Mapped, stage: int) -> str:
     stages, states = mapped.stages, mapped.landings.ends
     size = len(stages.kernel.states)
     unlike = np.abs(np.abs(states[least, :size]) - np.abs(states[most, :size])) / stages.scales[stage]
-    unlike[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these tell the distance, and the wait
+    unlike[[stages.integral, stages.sticking, stages.kernel.position]] = 0.0  # these give the distance and the wait
     return stages.kernel.states[int(unlike.argmax())]
 
 
@@ -216,7 +217,10 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """Return the runs of the outermost points whose next landing is about as far, so that the map must be extended."""
+    """Return the runs of the outermost points that land about as far off next.
+
+    At these points the map must be extended.
+    """
     settings = ReturnMapSettings.current()
     runs = []
     for side in landing_map.sides:
@@ -230,7 +234,7 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
     """Return starts half-way between some runs and their neighbours.
 
-    `starts` ascend; `numbers` are the numbers of their runs.
+    `starts` ascend; `numbers` are the run numbers of the starts, and `runs` the numbers of the runs.
     """
     between = []
     for run in runs:
@@ -242,9 +246,9 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts between neighbours of which only one lands, or whose landings differ widely.
+    """Return starts at breaks of the map, where only one of two neighbours lands, or their landings differ.
 
-    An attractor may reach up to such a break of the map. Starts ascend. `landings`, (runs,), are the first landings.
+    An attractor may reach up to such a break. Starts ascend. `landings`, (runs,), are the first landings.
     """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
@@ -262,8 +266,8 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
     """Return a start whose run should land at a place, or None.
 
-    It lies between two neighbours that land on either side. `starts` (runs,) ascend; `seen` (runs, landings) are
-    landings with the start first.
+    It lies between two neighbouring starts whose runs land on either side of the place. `starts` (runs,) ascend; `seen`
+    (runs, landings) are landings with the start first.
     """
     best, start = np.inf, None
     for k in range(1, ReturnMapSettings.current().run_landings):

@@ -12,17 +12,18 @@ class ReturnMapSettings(Settings):
     """Settings of return maps, which predict the next sticking distance from the present one."""
 
     hardly_attracting_share: float = setting(0.95, "")
-    """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. With more, 51 of
-    149 did not attract."""
+    """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. Above it, 51 of 149
+    sketched attractors did not attract."""
 
     least_arriving_points: int = setting(4, "")
     """Fewest points of a map that must lead to an attractor. Fewer come from gaps of the map."""
 
     attractor_tries: int = setting(4, "")
-    """Tries to close an attractor. Each adds landings where the map leads; after four the map does not change."""
+    """Tries to close an attractor. Each adds landings where the map predicts them; after four the map does not
+    change."""
 
     followed_repetitions: int = setting(3, "")
-    """Repetitions for which a run follows an attractor of the map before it counts as one of the stage."""
+    """Repetitions for which a run must follow an attractor of the map before an orbit is closed from it."""
 
     simple_closing_share: float = setting(0.05, "")
     """Largest difference between landings of the simplest cycles from which an orbit can be closed."""
@@ -68,7 +69,7 @@ class ReturnMapSettings(Settings):
     """Last landings examined for repetition. Ten has many divisors, so cycles of 1, 2, 5 and 10 landings are seen."""
 
     exact_repetition_share: float = setting(1e-9, "")
-    """Error of a repetition that is too small for a slow approach."""
+    """Largest error of a repetition that is exact. A slow approach has a larger one."""
 
     arrived_share: float = setting(1e-6, "")
     """Change of landings below which they have reached a cycle."""
@@ -104,7 +105,7 @@ class ReturnMapSettings(Settings):
     """Further rounds for a stage that stops short, creeps, or is driven at its force limit."""
 
     run_landings: int = setting(3, "landings")
-    """Landings of a run. After the first one, the next ones no longer depend on the start."""
+    """Landings of a run. From the first one on, they no longer depend on the start."""
 
     coarse_gap_log: float = setting(0.15, "")
     """Widest gap between points away from the diagonal. Wider ones hide folds of the map."""
@@ -116,13 +117,13 @@ class ReturnMapSettings(Settings):
     """Range about the diagonal in which gaps must be fine: swings grow or shrink by less than a tenth."""
 
     outermost_loss_log: float = setting(0.3, "")
-    """Loss of the outermost points beyond which the map leads inward, so that no attractor lies farther off."""
+    """Loss of the outermost points beyond which the map leads inward, so that no attractor lies farther out."""
 
     break_width_log: float = setting(0.02, "")
     """Width to which a break between two starts is narrowed down."""
 
     runs_added: int = setting(12, "")
-    """Most runs added at once for one stage, for which all others wait."""
+    """Most runs added at once for one stage, because all other stages wait for them."""
 
     refining_rounds: int = setting(2, "")
-    """Rounds of refinement. Afterwards the map changes only where a search decides anyway."""
+    """Rounds of refinement. Further rounds change the map only where a search decides in any case."""

@@ -1,6 +1,6 @@
 """Draw figures in a process beside a command: ``python -m friso.shown.drawing.artist``.
 
-The process is asked for images of a figure by `friso.shown.drawing.images`, and answers with their bytes.
+`friso.shown.drawing.images` asks the process for images of a figure, and it answers with their bytes.
 """
 
 from __future__ import annotations

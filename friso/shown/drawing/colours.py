@@ -24,14 +24,15 @@ VIRIDIS = (
 )
 
 MORE = VIRIDIS[::-1]
-"""From little to much: little, which lies beside cells that rest, is as light as these."""
+"""Colours from little to much. Little is as light as the cells that rest, which lie beside it."""
 
 
 @dataclass(frozen=True)
 class ColourScale:
-    """The colours of the drawn numbers from `low` to `high`: even `steps`, or else blending into each other.
+    """Colours of the drawn numbers from `low` to `high`.
 
-    `ticks` (drawn numbers) and `texts` are written at the colour bar; none: as the renderer likes.
+    There are even `steps`, or else the colours blend into each other. `ticks` (drawn numbers) and `texts` are written
+    at the colour bar; without them the renderer chooses.
     """
 
     low: float
@@ -51,7 +52,7 @@ class ColourScale:
 
 
 def painted(field: Coloured) -> Array:
-    """Return the numbers as drawn: z, or its logarithm from the lower limit on."""
+    """Return the numbers as drawn: z, or its logarithm, with values below the lower limit raised to it."""
     if not field.log:
         return field.z
     low, _ = _limits(field)
@@ -70,7 +71,8 @@ def scale(field: Coloured) -> ColourScale:
     low, high = math.log10(low), math.log10(high)
     step = max(1, math.ceil((high - low) / 6))
     decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, step)
-    texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))  # `painted` lifts what is lower
+    # `painted` raises lower numbers to the limit
+    texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))
     return ColourScale(low, high, MORE, False, (low, *decades), texts)
 
 

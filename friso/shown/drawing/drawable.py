@@ -1,6 +1,6 @@
 """Turn a figure in SI units into the arrays that are drawn.
 
-Units get prefixes, lines are thinned, and limits are laid out. Both renderers start here, so that they draw the same
+Units get prefixes, lines are thinned, and limits become lines. Both renderers start here, so that they draw the same
 arrays.
 """
 
@@ -21,7 +21,7 @@ Field = TypeVar("Field", bound=Coloured)
 
 
 LONGEST_TEXT = 1000
-"""Longest text in a figure in characters; the longest caption has half of them."""
+"""Longest text in a figure in characters. The longest caption has half as many."""
 
 
 def drawable(figure: Figure) -> Figure:
@@ -32,7 +32,7 @@ def drawable(figure: Figure) -> Figure:
 def _escaped_part(part: Any) -> Any:
     """Return a part of a figure with its texts escaped and shortened.
 
-    Such texts may come from a file that others wrote.
+    Texts may come from a file that others wrote.
     """
     if isinstance(part, str):
         text = escaped(part)
@@ -48,7 +48,7 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
     """Return the edges, shape (n + 1,), of the cells around ascending centres, shape (n,).
 
     Edges lie half-way between centres, on a logarithmic axis by ratio. A single cell reaches half its value, or 0.5, to
-    both sides; a single logarithmic one reaches a factor of two.
+    both sides; on a logarithmic axis it reaches a factor of two.
     """
     if log:
         return np.exp(cell_edges(np.log(centres))) if len(centres) > 1 else np.array([centres[0] / 2, centres[0] * 2])
@@ -68,7 +68,7 @@ def colour_prefix(field: Coloured) -> tuple[float, str]:
 
 
 def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
-    """Return the categories and markers of all panels with maps or clouds, for one legend.
+    """Return the categories and markers of all panels with maps or clouds, for one common legend.
 
     Only categories that occur are included, each once.
     """
@@ -91,7 +91,7 @@ def line_key(figure: Figure) -> list[Series]:
 
 
 WORDS = 12
-"""Largest number of words at an axis."""
+"""Largest number of words written at an axis."""
 
 
 def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
@@ -131,7 +131,7 @@ def _panel(panel: Panel) -> Panel:
 
 
 def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
-    """Return the values that decide the prefix of an axis: its limits, or else all finite data."""
+    """Return the values that decide on the prefix of an axis: its limits, or else all finite data."""
     if axis.limits is not None:
         return np.array(axis.limits)
     values = _finite(np.concatenate([np.empty(0), *(np.asarray(array, dtype=float) for array in arrays)]))

@@ -1,7 +1,7 @@
 """Describe a figure as plain data, before it is drawn.
 
-An analysis answers with a `Figure`, and a renderer draws it. All data stand in the unit of their axis, which is an SI
-unit when the figure is made. `friso.shown.drawing.drawable` picks the prefix and thins the lines, once for both
+An analysis answers with a `Figure`, and a renderer draws it. All data are in the unit of their axis, which is an SI
+unit when the figure is made. `friso.shown.drawing.drawable` chooses the prefix and thins the lines, once for both
 renderers.
 """
 
@@ -124,7 +124,7 @@ class Limit:
 class Category:
     """A word in place of a number, with one flat colour.
 
-    It is a verdict, or the reason why there is no number.
+    It is a verdict, or the reason for a missing number.
     """
 
     label: str
@@ -133,11 +133,11 @@ class Category:
 
 @dataclass(frozen=True)
 class Coloured:
-    """Points x, y coloured by the number z [unit] or, where there is one, by their category.
+    """Points x, y coloured by the number z [unit] or, where there is one, by a category.
 
-    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`; `colours`, if given,
-    are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `categories`; it is NaN
-    where z counts.
+    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. `colours`, if given,
+    are instead the colours of the whole numbers 0, 1, 2, ... `codes`, of the shape of z, are numbers of `categories`;
+    where a code is NaN, z counts.
     """
 
     x: Array
@@ -172,7 +172,10 @@ class Coloured:
 
 @dataclass(frozen=True)
 class Map(Coloured):
-    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending; NaN cells of no category stay empty."""
+    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending.
+
+    Cells that are NaN and have no category stay empty.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -213,7 +216,7 @@ class Panel:
 
     @property
     def coloured(self) -> tuple[Coloured, ...]:
-        """Maps and clouds: what needs a colour bar or a legend of colours."""
+        """Return maps and clouds, which need a colour bar or a legend of colours."""
         return (*self.maps, *self.clouds)
 
 

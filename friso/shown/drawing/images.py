@@ -28,7 +28,7 @@ PROGRAM, MOST = "friso.shown.drawing.artist", 2
 class Image(NamedTuple):
     """A form of a figure: its format, one of FORMATS, and whether it has heading and note.
 
-    Without them, the image is cut off below the heading and above the note.
+    An image without heading or note is cut off there.
     """
 
     form: str
@@ -63,7 +63,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def draw_beforehand(figures: Iterable[Figure], images: Iterable[Image]) -> None:
-    """Begin to draw images that will be asked for, if other processes draw."""
+    """Begin to draw images that will be needed, if other processes draw."""
     if artists := _ARTISTS.get():
         artists.begin(figures, tuple(images))
 
@@ -90,7 +90,7 @@ _Job = Future[dict[Image, bytes]]
 
 
 class Artists:
-    """Processes that draw, and the images that they are drawing."""
+    """Processes that draw, and the images in progress."""
 
     def __init__(self) -> None:
         """Start the first process; others follow when they are needed."""
@@ -136,7 +136,7 @@ class Artists:
         return {}
 
     def _candidates(self) -> Iterator[HelperProcess]:
-        """Yield the free processes, some of which may have ended by themselves, then a new one."""
+        """Yield processes to draw in: free ones, some of which may have ended, then a new one."""
         with suppress(IndexError):
             while True:
                 yield self._free.pop()

@@ -43,7 +43,8 @@ def _add(
     style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > _VECTORS}
     if isinstance(field, Map):
         x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)
-        seams = {} if style["rasterized"] else {"edgecolors": "face", "linewidth": 0.2}  # else white hairlines in SVG
+        # without them SVG shows white hairlines
+        seams = {} if style["rasterized"] else {"edgecolors": "face", "linewidth": 0.2}
         return axes.pcolormesh(x, y, np.ma.masked_invalid(values), **seams, **style)
     finite = np.isfinite(values)
     edge = {"s": 20, "linewidths": 0.3, "edgecolors": GREY}
@@ -134,7 +135,7 @@ def add_footer(
 
 
 def _key_rows(figure: Figure, width: float) -> int:
-    """Return the rows of the legend, with columns as wide as the longest text and its patch."""
+    """Return how many rows the legend takes, with columns as wide as the longest text and its patch."""
     labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0

@@ -152,7 +152,7 @@ class _LaidOut:
     """A figure on a canvas whose parts have their places."""
 
     def __init__(self, figure: Figure) -> None:
-        """Draw the figure once, and fix the places of its parts."""
+        """Draw the figure once, which fixes the places of its parts."""
         self.figure, self.canvas = figure, render(figure)
         if engine := self.canvas.get_layout_engine():
             engine.execute(self.canvas)
@@ -185,7 +185,7 @@ class _LaidOut:
         """Return an area of the canvas, or all of it, as the bytes of a file."""
         stream = io.BytesIO()
         with _letters_alone() if form == "pdf" else nullcontext():
-            dots = DOTS if form == "png" else FINER * DOTS  # of pictures inside
+            dots = DOTS if form == "png" else FINER * DOTS  # resolution of pictures inside
             self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area, dpi=dots)
         return stream.getvalue()
 
@@ -215,7 +215,7 @@ def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
 def _letters_alone() -> Iterator[None]:
     """Embed fonts without the tables for placing letters.
 
-    To cut these tables down to the letters that occur would take two thirds of the time of a PDF. Matplotlib sets the
+    Cutting these tables down to the letters that occur would take two thirds of the time of a PDF. Matplotlib sets the
     options of FontTools, so they are replaced in the `with` block.
     """
     from fontTools import subset
@@ -237,7 +237,7 @@ def _letters_alone() -> Iterator[None]:
 def _laid_out(figure: Figure) -> _LaidOut:
     """Lay a figure out, and keep the last figures for their next format.
 
-    A page shows a figure that is written as a file, too.
+    A page, for example, shows a figure that is also written as a file.
     """
     for kept in tuple(_last):
         if kept.figure is figure:
@@ -250,7 +250,8 @@ def _laid_out(figure: Figure) -> _LaidOut:
 _last: deque[_LaidOut] = deque(maxlen=6)
 
 _one_at_a_time = RLock()
-"""Matplotlib's parameters are those of the process, and a canvas may be kept, but friso app draws in threads."""
+"""Lock for drawing: Matplotlib's parameters belong to the process, and a canvas may be kept, but friso app draws in
+several threads."""
 
 
 @contextmanager
@@ -273,7 +274,7 @@ def _row_height(figure: Figure) -> float:
 
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
-    """Draw everything of one panel, which is `width` [inch] wide."""
+    """Draw everything in one panel, which is `width` [inch] wide."""
     _scale(axes, panel)
     draw_coloured(axes, panel)
     handles: list[Artist] = []
@@ -304,7 +305,7 @@ def _scale(axes: Axes, panel: Panel) -> None:
 
 
 def _ticks(axes: Axes, panel: Panel, width: float) -> None:
-    """Set the ticks of a panel: plain numbers, never a factor or an offset beside the axis."""
+    """Set the ticks of a panel: plain numbers, without a factor or an offset beside the axis."""
     bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
     for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
         if declared.words:
@@ -336,13 +337,13 @@ def _decades(axis: Any, even: Locator) -> None:
 def _power_of_ten(value: float, _: int | None = None) -> str:
     """Return the label of a tick at a power of ten, in letters.
 
-    Formulas would take a tenth of the time of a figure.
+    Setting it as a formula would take a tenth of the time of a figure.
     """
     return "10" + str(round(math.log10(value))).translate(_RAISED)
 
 
 def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
-    """Write the labels, and the title over the legend above the axes, where no data are covered."""
+    """Write the labels, and the title over the legend above the axes, where they cover no data."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
     labels = [item.label for item in _items(panel)]
@@ -350,7 +351,7 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
     labels = [label for label in labels if label]
     rows = _legend_rows(_labels(panel), width)
     if rows:
-        columns = -(-len(labels) // rows)  # matplotlib fills them one after the other
+        columns = -(-len(labels) // rows)  # matplotlib fills columns one after the other
         place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
         legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
         for text in legend.get_texts():

@@ -1,4 +1,4 @@
-"""Compress what a page carries; a browser unpacks it."""
+"""Compress the contents of a page, which a browser unpacks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import gzip
 import json
 
 LEVEL = 6
-"""Level of gzip: the tightest takes half as long again and saves two thousandths of the size."""
+"""Level of gzip. The highest level takes half as long again and saves two thousandths of the size."""
 
 
 def packed(text: str) -> str:

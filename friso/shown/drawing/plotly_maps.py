@@ -1,7 +1,4 @@
-"""Draw maps and clouds on a page.
-
-This includes traces, colour bars, and the legend and note beneath a figure.
-"""
+"""Draw maps and clouds on a page: traces, colour bars, and legend and note beneath a figure."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ GAP = 0.09  # between two panels of a row, as a fraction of the width
 _BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
 _CONFIG = {
     "displaylogo": False,
-    "responsive": False,  # page.js sees to that
+    "responsive": False,  # page.js resizes
     "modeBarButtons": _BUTTONS,
     "showSendToCloud": False,
     "plotlyServerURL": "",
@@ -57,7 +57,7 @@ _CONFIG = {
 
 @cache
 def script() -> str:
-    """Return plotly.js of the installed package, packed, to stand once in a page."""
+    """Return plotly.js of the installed package, packed, to be placed once in a page."""
     return packed(get_plotlyjs())
 
 
@@ -66,7 +66,7 @@ def fragment(figure: Figure) -> str:
 
     The data hold what plotly draws, and the layout and places of colour bars on a narrow screen.
     """
-    narrow = narrow_parts(figure)  # its traces are those of the wide one but for their colour bars' places
+    narrow = narrow_parts(figure)  # traces differ only in the places of colour bars
     narrow["layout"] = _checked([], narrow["layout"]).to_plotly_json()["layout"]
     drawn = _on_both(render(figure).to_plotly_json(), narrow)
     return (
@@ -76,18 +76,18 @@ def fragment(figure: Figure) -> str:
 
 
 def parts_of_both(figure: Figure) -> dict[str, Any]:
-    """Return `parts` with what differs on a narrow screen: layout, and places of colour bars."""
+    """Return `parts`, with what is different on a narrow screen: layout, and places of colour bars."""
     prepared = drawable(figure)
     return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
-    """Return the wide figure with what differs on a narrow screen."""
+    """Return the wide figure with what is different on a narrow screen."""
     return {**wide, "narrow": narrow["layout"], "bars": [_bar(trace) for trace in narrow["data"]]}
 
 
 def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
-    """Return where the colour bar of a trace stands; None without one."""
+    """Return the place of a trace's colour bar, or None."""
     bar = trace.get("colorbar") or trace.get("marker", {}).get("colorbar")
     return {name: bar[name] for name in ("x", "y", "len")} if bar else None
 
@@ -95,8 +95,8 @@ def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
 def _single(part: Any) -> Any:
     """Return arrays in single precision, which is enough for a screen and half as long.
 
-    The first bytes of all numbers stand before the second ones, which packs better; `page.js` puts them together.
-    Numbers that are not finite become null.
+    The first bytes of all numbers come before the second bytes, and so on, which packs better; `page.js` puts them
+    together. Numbers that are not finite become null.
     """
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
@@ -128,8 +128,8 @@ def narrow_parts(figure: Figure) -> dict[str, Any]:
 def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     """Return traces and layout as plain dictionaries that hold NumPy arrays.
 
-    Plotly does not validate them, which would take ten times as long as making them. `width` is the least width [px]
-    for the axes of all columns.
+    Plotly does not validate them, because that would take ten times as long as making them. `width` is the least width
+    [px] for the axes of all columns.
     """
     return _laid_out(drawable(figure), width)
 
@@ -141,7 +141,7 @@ def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     header = max(head.height for head in heads)
     row = header + plot + FOOTER
     height = row * prepared.rows
-    key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
+    key = f"legend{len(prepared.panels) + 1}"  # the panels have the earlier numbers
     below, legend, note = footer(prepared, key, width)
     layout: dict[str, Any] = {
         "height": height + TOP + below,
@@ -186,7 +186,7 @@ class _Head:
 
     @classmethod
     def of(cls, panel: Panel, width: int, panels: int) -> _Head:
-        """Break title and legend of a panel where so many panels share a width [px].
+        """Break title and legend of a panel into lines and rows, where `panels` panels share a width [px].
 
         Entries stand in columns as wide as the longest. Plotly breaks a row at the width of the whole figure. Beside
         other panels, entries that need several rows are therefore stacked.
@@ -228,7 +228,7 @@ class _Head:
 def _labels(panel: Panel) -> list[str]:
     """Return the entries of a panel's legend.
 
-    There are none for a single line, or where colours stand for numbers.
+    There are none for a single line, or if colours stand for numbers.
     """
     labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
     return labels if len(labels) > 1 and not panel.coloured else []
@@ -285,7 +285,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
     if axis.words:
         positions, words = word_ticks(axis)
         settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
-        settings["automargin"] = True  # words are of any length
+        settings["automargin"] = True  # words may have any length
     if axis.log:
         settings |= _log_ticks(axis.limits)
     if axis.step:
@@ -298,7 +298,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
 def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     """Return the ticks of a logarithmic axis.
 
-    They are decades, with 2 and 5 or more between them if decades are too few; plotly alone would write 0.5 as "5". If
+    They are decades, with 2 and 5 or more between them if decades are too few; plotly itself would write 0.5 as "5". If
     even these are too few, there are about five round numbers.
     """
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf

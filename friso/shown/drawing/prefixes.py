@@ -1,4 +1,4 @@
-"""Write numbers as they are read: with the SI prefix that suits them, as ranges, in percent."""
+"""Write numbers for readers: with the SI prefix that suits them, as ranges, in percent."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 
 SOLVED = 1e-9
-"""Length [m] below which a motion that was simulated is not distinguished from rest."""
+"""Length [m] below which a simulated motion cannot be told from rest."""
 
 
 def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
-    """Return factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
+    """Return factor and prefixed unit for `values` [unit]: prefixed value = factor * value.
 
-    The unit follows the kind of axis: "m" is "rad" on a rotary one. The largest magnitude falls between 1 and 1000 if a
-    prefix allows it. On a logarithmic axis, the middle of the range does. Units without prefix (kg, m^2) keep the
+    The unit follows the kind of axis: "m" is "rad" on a rotary one. If a prefix allows it, the largest magnitude falls
+    between 1 and 1000; on a logarithmic axis, the middle of the range does. Units without prefix (kg, m^2) keep the
     factor 1. Only finite values count.
     """
     unit = unit_shown(unit)
@@ -50,7 +50,10 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
 
 
 def pretty(unit: str) -> str:
-    """Return a unit as it is printed: "N*s/m^2" becomes "N·s/m²". It follows the kind of axis."""
+    """Return a unit as it is printed: "N*s/m^2" becomes "N·s/m²".
+
+    It follows the kind of axis.
+    """
     unit = unit_shown(unit)
     for plain, raised in _POWERS.items():
         unit = unit.replace(plain, raised)
@@ -69,9 +72,9 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 
 
 def length_at_rest(value: float) -> str:
-    """Write how far [m] something still moves.
+    """Write how far [m] a stage still moves.
 
-    Below a nanometre, digits would be the solver's.
+    Below a nanometre, digits would only show the solver's error.
     """
     return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
 
@@ -82,13 +85,13 @@ def digits_that_differ(values: Sequence[float]) -> int:
 
 
 def rounded_up(value: float, digits: int = 3) -> float:
-    """Round a positive value to so many significant digits, never downward."""
+    """Round a positive value up to `digits` significant digits."""
     unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
     return math.ceil(value / unit - 1e-9) * unit
 
 
 def rounded_down(value: float, digits: int = 3) -> float:
-    """Round a positive value to so many significant digits, never upward."""
+    """Round a positive value down to `digits` significant digits."""
     unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
     return math.floor(value / unit + 1e-9) * unit
 
@@ -108,7 +111,7 @@ def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
 def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
     """Write the part of a searched range [unit] in words.
 
-    The part is open at an end that is an end of the search.
+    The part counts as open at an end that is also an end of the search.
     """
     if (low, high) == searched:
         return f"all from {range_with_unit(low, high, unit)}"
@@ -135,7 +138,7 @@ def percent_range(low: float, high: float) -> str:
 
 
 def percentage(part: float) -> str:
-    """Write a part of one in percent without the sign, to a tenth; to a hundredth near 0 and 100."""
+    """Write a fraction in percent without the sign, to a tenth; to a hundredth near 0 and 100."""
     return f"{100 * part:.{1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2}f}"
 
 

@@ -11,7 +11,7 @@ KEPT = 5  # at most this many samples of a bucket are kept: the extremes of x an
 
 
 def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
-    """Return samples of the line (x, y), in order, that look like all of it.
+    """Return samples of the line (x, y), in order, that look like the whole line.
 
     x and y have shape (n,) and any unit; NaN breaks the line. Lines of up to KEPT * buckets samples are returned as
     they are. Of a longer line, the first and last sample are kept. In each bucket of neighbouring samples, the ones

@@ -1,1 +1,1 @@
-"""Compare a joint with settings of the controller on the same random machines."""
+"""Compare a joint and settings of the controller on the same random machines."""

@@ -1,4 +1,4 @@
-"""Replace a machine's controller by active disturbance rejection, and compute its numbers."""
+"""Replace a machine's controller by active disturbance rejection."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ADRC = "adrc"
 
 
 class Rejection(NamedTuple):
-    """The bandwidth of the feedback [Hz], and the observer's bandwidth as a multiple of it."""
+    """Bandwidth of the feedback [Hz], and bandwidth of the observer as a multiple of it."""
 
     bandwidth: float
     observer_ratio: float
@@ -47,5 +47,5 @@ def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
 
 
 def rejection(flat: Mapping[str, Any]) -> Rejection | None:
-    """Return the numbers of a disturbance-rejecting controller, None for other controllers."""
+    """Return the bandwidths of a disturbance-rejecting controller, None for other controllers."""
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None

@@ -19,7 +19,7 @@ from friso.stage.lists import element_keys
 from friso.virtual_rig.task import SAMPLE_TIME
 
 LEAST, MOST = 20, 100_000
-"""Fewest machines, for a useful interval, and most, which take hours."""
+"""Fewest machines, because fewer give no useful interval, and most, because more take hours."""
 
 
 SPREADS: Mapping[str, float] = MappingProxyType(
@@ -42,7 +42,7 @@ SPREADS: Mapping[str, float] = MappingProxyType(
         "rail.coulomb_deviation": 30.0,
     }
 )
-"""Half-widths of the 95 % intervals [%] of keys for which the stage file has none, chosen by friso: friction as it
+"""Half-widths of the 95 % intervals [%] of keys for which the stage file has none. friso chose them: friction as it
 differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as uncertain as
 identification leaves them."""
 
@@ -51,11 +51,11 @@ ELEMENTS: Mapping[str, float] = MappingProxyType({"friction.element_stiffness": 
 one common factor."""
 
 SLIP = "friction.breakaway_deflection"
-"""Key of the deflection at which elasto-plastic bristles begin to slip. It is drawn as a fraction of that of sliding,
-F_c/sigma_0, which it must not reach: the spread applies to this fraction over one minus it."""
+"""Key of the deflection at which elasto-plastic bristles begin to slip. It is drawn as a fraction f of the deflection
+of sliding, F_c/sigma_0, which it must not reach: the spread applies to f/(1 - f)."""
 
 TINY = 1e-6
-"""Factor on this deflection while the other keys are drawn, so that it excludes none of them."""
+"""Factor on the slip deflection while the other keys are drawn, so that it excludes none of their values."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 """Keys that both follow the preload, and their correlation if neither is uncertain in the file (friso's choice)."""
@@ -64,8 +64,7 @@ HELD = (
     *(f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.velocity_sample_time", "drive.position_sample_time"),
     *("drive.delay", "drive.velocity_samples"),
 )
-"""Prefixes of keys that are set rather than identified: equal on all machines, even if the file calls them uncertain.
-"""
+"""Prefixes of keys that an engineer sets: they are equal on all machines, even if the file calls them uncertain."""
 
 SIGNS = int.from_bytes(b"signs")
 """Second half of Philox's key for the signs of model errors."""
@@ -78,9 +77,9 @@ FROM_LEAVES = ("joint.stiffness", "parasitic.")
 class Machines:
     """Machines drawn around a stage whose drive states a sample time.
 
-    `keys` that differ are SI arrays of shape (count,). Further fields are the seeds of noise, and the sign, 1 or -1, of
-    the error of each machine's model. `drawn` and `spreads` [%] tell from which keys of the file and which default
-    spreads they were drawn; notes are for the reader.
+    `keys` that differ between machines are SI arrays of shape (count,). Further fields are the seeds of noise, and the
+    sign, 1 or -1, of the error of each machine's model. `drawn` and `spreads` [%] tell from which keys of the file, and
+    from which default spreads, the machines were drawn. `notes` are for the reader.
     """
 
     stage: Stage
@@ -98,14 +97,14 @@ class Machines:
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys of all machines under an option, with its stage and changes.
+        """Return the keys of all machines under an option, which has a stage and changes.
 
         The controller is tuned for the stage, not for the drawn masses.
         """
         return stage.flat(self.changes(stage, changes))
 
     def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys changed by an option, and those that differ between the machines."""
+        """Return the keys that differ between machines, and those that an option changes."""
         return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
@@ -141,9 +140,9 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
 
 
 def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
-    """Return the stage with a sample time, and a note if it had to be chosen.
+    """Return the stage with a sample time, and a note if friso had to choose it.
 
-    Raises InputError if it is too long.
+    Raises InputError if the sample time is too long.
     """
     if "drive.sample_time" in stage.flat():
         return stage, []

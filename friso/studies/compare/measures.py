@@ -1,5 +1,4 @@
-"""Measure machines: swinging, settling, standstill, force,
-and the margin of the linear loop."""
+"""Measure machines: swinging, settling, standstill, force, and the margin of the linear loop."""
 
 from __future__ import annotations
 
@@ -20,11 +19,11 @@ from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
 
 DENSITY, SLOWEST, FASTEST = 25, 0.1, 10.0
-"""Frequencies per decade at which loops are evaluated, besides those near resonances; the lowest, over the slowest
+"""Frequencies at which loops are evaluated: per decade, apart from those near resonances; the lowest, over the slowest
 pole; the highest, over the fastest pole, or half the sampling frequency."""
 
 CLOSER, WITHIN = 2, 9
-"""Refinements about the frequency at which a loop comes closest to -1, and frequencies of each."""
+"""Refinements of the frequency at which a loop comes closest to -1, and number of frequencies in each."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,8 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
     """Measure a chunk of runs whose reference comes to stand at `stands`.
 
-    The tolerance for in position is `within` [m]. Peaks are those in the drive's log, all else those of the true
-    motion.
+    A machine is in position `within` [m] of its reference. Peaks are counted in the drive's log; all else is measured
+    on the true motion.
     """
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
@@ -93,7 +92,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 
 @dataclass(frozen=True)
 class Later:
-    """Runs that were continued, arrays of shape (some,).
+    """Runs that were continued, arrays of shape (runs,).
 
     `done` tells whether they were completed, `stays` whether the stage is in position throughout the last half.
     """
@@ -104,7 +103,7 @@ class Later:
 
 @np.errstate(all="ignore")
 def staying_in_position(recorded: RecordedRuns, within: float) -> Later:
-    """Return whether the runs of a chunk stay in position, `within` [m]."""
+    """Return whether runs of a chunk stay within `within` [m] of their reference."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE
     words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)
@@ -119,8 +118,8 @@ def _rms(values: np.ndarray) -> np.ndarray:
 class LoopRobustness:
     """Stability and margin of the linear loop of each machine, arrays of shape (count,).
 
-    `stable` tells whether it is stable in all limit cases, `margin` is the least modulus margin among them (0 where it
-    is not stable).
+    `stable` tells whether the loop is stable in all limit cases, `margin` is the least modulus margin among the cases
+    (0 if it is not stable).
     """
 
     stable: np.ndarray

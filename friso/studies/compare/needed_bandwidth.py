@@ -1,4 +1,4 @@
-"""Find the bandwidth from which on a controller alone brings random machines to rest."""
+"""Find the bandwidth from which a controller alone brings random machines to rest."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Fractions of machines that come to rest by the controller alone, over its bandwidth, (n,).
+    """Fractions of machines that come to rest by the controller alone, for each bandwidth, (n,).
 
-    The bandwidths [Hz] are those at which the open loop last crosses 0 dB, from the present one to the highest with
-    enough margin. The joint is locked, and the controller in continuous time.
+    The bandwidths [Hz] are the last 0 dB crossings of the open loop, from the present one to the highest with enough
+    margin. The joint is locked, and the controller in continuous time.
     """
 
     bandwidths: np.ndarray
     shares: np.ndarray
 
     def turning(self, enough: float) -> int | None:
-        """Return the index of the bandwidth from which on enough machines come to rest, or None.
+        """Return the index of the bandwidth from which enough machines come to rest, or None.
 
         `enough` is their fraction.
         """

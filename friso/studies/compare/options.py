@@ -1,4 +1,4 @@
-"""Define the options to settle a machine: settings of its controller, a joint, or both."""
+"""Define the options for bringing a machine to rest: controller settings, a joint, or both."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from friso.studies.settings import StudySettings
 
 DEADBAND = 0.5
 """Deadband of the integrator over the tolerance for in position (friso's choice). The integrator pauses while the stage
-is in position, and the edge of the band differs from the tolerance."""
+is in position, and the edge of the deadband lies inside the tolerance."""
 
 MODEL_ERROR = 0.2
 """Relative error of the friction in the feedforward, with one sign for Coulomb and viscous friction of a machine."""
@@ -81,10 +81,10 @@ class Situation:
 
 
 class Variant(NamedTuple):
-    """A stage of one option.
+    """A stage with one option.
 
-    It has the keys that differ between machines (numbers, or arrays with one value for each machine), and the factor by
-    which its controller is faster.
+    `changes` are keys that differ between machines: numbers, or arrays with one value for each machine. `factor` is the
+    factor by which the controller is faster.
     """
 
     stage: Stage
@@ -130,7 +130,7 @@ class OptionKind:
 
 @dataclass(frozen=True)
 class Option:
-    """An option for the machines: its kind, with stage, changes and factor as in `Variant`."""
+    """An option on the machines: its kind, with stage, changes and factor as in `Variant`."""
 
     kind: OptionKind
     stage: Stage
@@ -152,7 +152,7 @@ class Option:
 class CompareOptions:
     """Options that the machines can have.
 
-    `left_out` gives the reason for others, by letter; the deadband of the integrator is in [m].
+    `left_out` gives by letter why an option was left out; the deadband of the integrator is in [m].
     """
 
     options: tuple[Option, ...]
@@ -163,8 +163,8 @@ class CompareOptions:
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return keys for the linear loop of machines.
 
-    The current loop is that of the stage for all machines, and the true over the believed motor constant is part of
-    the controller's gains. The cable is left out.
+    All machines have the stage's current loop. The ratio of true to assumed motor constant is part of the controller's
+    gains. The cable is left out.
     """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
@@ -199,7 +199,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the file's machine keeps its margin.
 
     The bandwidth is below its limit. An engineer tunes one machine, and all others get its settings. Raises
-    UnavailableError if the present bandwidth is that high already.
+    UnavailableError if the present bandwidth is already that high.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -223,7 +223,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
 def _feedforward(situation: Situation) -> Variant:
     """Return the locked stage with feedforward of each machine's Coulomb and viscous friction.
 
-    Both are off by the model error. Raises UnavailableError if there is no such friction.
+    The feedforward of both is off by the model error. Raises UnavailableError if there is no such friction.
     """
     machines = situation.machines
     flat = anywhere(machines.flat(machines.stage, {}))
@@ -245,7 +245,7 @@ def _with_setting(setting: Setting, situation: Situation) -> Variant:
 
 
 def _rejecting(situation: Situation) -> Variant:
-    """Return the locked stage with active disturbance rejection of the present speed."""
+    """Return the locked stage with active disturbance rejection, as fast as the present controller."""
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
     try:

@@ -1,4 +1,4 @@
-"""Medians and paired differences of machines, with 95 % intervals."""
+"""Compute medians and paired differences of machines, with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def median(values: np.ndarray) -> EstimatedValue:
 def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
     """Return the 95 % interval of a quantile of a population, from values (n,) drawn from it.
 
-    `share` of the population does not exceed it. The interval by order statistics (David, Nagaraja 2003, Order
-    Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
+    A fraction `share` of the population lies below the quantile. The interval by order statistics (David, Nagaraja
+    2003, Order Statistics, Sec. 7.1) holds for any distribution. It is infinite for too few values.
     """
     ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
     low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))

@@ -33,14 +33,14 @@ from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
 
 INTERVAL = 1e-3
-"""Least time [s] between evaluated samples: the next whole number of samples."""
+"""Least time [s] between evaluated samples. It is rounded up to a whole number of the drive's samples."""
 
 FOLLOWED, LONGER = 40, 6
-"""Machines that are run again, and the factor on their duration, because an integrator that was reset may swing that
+"""Number of machines that are run again, and the factor on their duration. An integrator that was reset may swing that
 slowly."""
 
 NOT_FOLLOWED = Later(np.zeros(0, bool), np.zeros(0, bool))
-"""Result for an option that needs no longer runs."""
+"""Result for an option whose machines are not run again for longer."""
 
 ENOUGH = 0.99
 """Fraction of the machines that an option must bring into position to count as bringing them to rest."""
@@ -52,7 +52,7 @@ afterwards."""
 
 @dataclass(frozen=True)
 class OptionResult:
-    """An option with the measures of each machine's run, and the linear loop of each.
+    """An option with the measures of each machine's run, and with the linear loop of each.
 
     `later` holds longer runs of the first machines; there are none if too few machines are in position at the end of
     the shorter ones.
@@ -80,7 +80,7 @@ class OptionResult:
 
     @property
     def settled(self) -> Share:
-        """Return the probability of being in position to stay by the end of the run."""
+        """Return the probability that a machine is in position by the end of the run, and stays there."""
         return share(self.measures.rests, self.measures.done)
 
     @property
@@ -117,7 +117,7 @@ class OptionResult:
 
     @property
     def in_position_count(self) -> int:
-        """Return the number of machines that are in position to stay by the end of the run."""
+        """Return the number of machines that are in position by the end of the run, and stay there."""
         return int(self.measures.rests.sum())
 
     @property
@@ -129,11 +129,12 @@ class OptionResult:
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a on paired machines.
+    """An option against option a, on paired machines.
 
-    It has the increase in the probability of swinging at the end. Fractions of machines are in position `sooner`,
-    `later` and `alike` (also if never with both). The medians are the factors on the root mean squares in position and
-    of the force.
+    `swinging` is the increase in the probability of swinging at the end. `sooner`, `later` and `alike` are the
+    fractions of machines that are in position sooner or later than with option a, or at the same time (or never with
+    both). `in_position` and `force` are the medians of the factors on the root mean square deviation in position, and
+    on the root mean square force.
     """
 
     swinging: EstimatedValue
@@ -146,10 +147,10 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The results of all options on machines drawn with a seed, with tolerance [m] and notes.
+    """Results of all options on machines drawn with a seed, with tolerance [m] and notes.
 
     `needed` gives the bandwidth that the controller alone needs. No faster controller exceeds `bandwidth_limit` [Hz].
-    The options `not_run` were skipped by an interruption.
+    The options in `not_run` were skipped by an interruption.
     """
 
     machines: Machines
@@ -170,12 +171,12 @@ class Comparison:
     def shaken(self) -> bool:
         """Tell whether a floor shakes the machines.
 
-        Without one their standstill shows whether they rest, not how still they stand.
+        Without a shaking floor, standstill shows whether machines rest, not how still they stand.
         """
         return self.stage.floor is not None
 
     def paired(self, result: OptionResult) -> Paired:
-        """Return an option against a, on the machines whose runs were completed with both."""
+        """Compare an option with option a, on the machines whose runs were completed with both."""
         runs, base = result.measures, self.results[0].measures
         both = runs.done & base.done
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -212,7 +213,7 @@ def compare(
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
-    settings_named(also, (ADRC,))  # refuses what there is none of
+    settings_named(also, (ADRC,))  # raises for unknown names
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     places = _places(machines.stage)
     begins()
@@ -269,7 +270,7 @@ class _Work:
     options: int
 
     def runs(self, option: Option, before: int) -> MachineMeasures:
-        """Return an option on all machines, after some other options."""
+        """Run an option on all machines, after `before` other options."""
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)
@@ -279,7 +280,7 @@ class _Work:
         return concatenate_chunks(parts)
 
     def longer(self, option: Option) -> Later:
-        """Return an option on the first machines, for longer."""
+        """Run an option on the first machines, for longer."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
         return concatenate_chunks(
@@ -301,7 +302,7 @@ def _loops(machines: Machines, option: Option) -> LoopRobustness:
 
 
 def _missing(stage: Stage) -> list[str]:
-    """List effects on real machines that are missing here, also in the linear loops."""
+    """List effects on real machines that the comparison and its linear loops leave out."""
     notes = []
     if stage.floor is None:
         notes.append(

@@ -1,6 +1,7 @@
-"""Fit the nearest concave, rising curve from 0 to points, as parallel springs that slip in turn can make.
+"""Fit the nearest concave, rising curve from 0 to points.
 
-The fit is by least squares. Knots near rest that the points do not support only follow noise, and are left out.
+Parallel springs that slip one after the other make such a curve. The fit is by least squares. Knots near rest that the
+points do not support only follow noise, and are left out.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from friso.studies.settings import StudySettings
 class ConcaveFit:
     """A concave curve from 0 to its end over increasing `knots`, shape (n,).
 
-    `strength`, shape (2, n), is the part that ends at each knot, of two kinds: straight up to the knot, and bent so
-    that its slope falls to 0. Further fields are the standard error of the initial slope, -2 times the logarithm of the
-    likelihood, and the number of free parameters.
+    The curve is a sum of parts, one for each knot and kind. Parts of the first kind are straight up to their knot;
+    parts of the second are bent so that their slope falls to 0 there. `strength`, shape (2, n), is the end value of
+    each part. Further fields are the standard error of the initial slope, -2 times the logarithm of the likelihood, and
+    the number of free parameters.
     """
 
     knots: np.ndarray
@@ -31,7 +33,7 @@ class ConcaveFit:
 
     @property
     def corners(self) -> np.ndarray:
-        """Return the knots at which a part ends, shape (at most n,)."""
+        """Return the knots at which some part of the curve ends, shape (at most n,)."""
         return self.knots[self.strength.any(axis=0)]
 
     @property
@@ -50,11 +52,11 @@ class ConcaveFit:
 
 
 _SLOPES = np.array([1.0, 2.0])
-"""Initial slopes of both kinds, in units of their ends over their knots."""
+"""Initial slopes of both kinds of parts, in units of their end value over their knot."""
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return both kinds of curves with ends of 1 at x, shape (m, 2 n).
+    """Return both kinds of parts with end value 1 at x, shape (m, 2 n).
 
     Below 0, where noise may lead, they continue straight.
     """
@@ -63,9 +65,9 @@ def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
 
 
 def knots_of(x: np.ndarray) -> np.ndarray:
-    """Return the knots at which a curve through points, shape (m,), may bend: all but 0, or some of them.
+    """Return the knots at which a curve through points, shape (m,), may bend.
 
-    They are closer together near 0, but not closer than the scatter of x.
+    They are all points but 0, or some of them: closer together near 0, but not closer than the scatter of x.
     """
     settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
@@ -84,8 +86,8 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
     """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`.
 
-    They are straight between their knots, or bent too if there are many, and with the first few knots left out. Beyond
-    the points they continue with the final slope, at most as far again.
+    Fits are made with straight parts and, for many points, with bent parts too, and with the first few knots left out.
+    Beyond the points a curve continues with its final slope, at most as far again.
     """
     settings = StudySettings.current()
     knots = knots_of(x)
@@ -108,7 +110,7 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
 
 
 def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return equivalent equations for a fit, as few as there are unknowns.
+    """Return the equations of a fit in an equivalent form with as few rows as unknowns.
 
     Their shape is (2 n + 1, 2 n + 1) at most, with the right-hand side last.
     """

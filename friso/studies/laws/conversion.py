@@ -22,7 +22,7 @@ from friso.studies.laws.virgin import VirginPoints, read_virgin_curve, with_virg
 from friso.studies.settings import StudySettings
 
 ELEMENTS = 6
-"""Default number of elements of a law with several."""
+"""Default number of elements, for a law that has several."""
 
 KEPT = 1e-6
 """Relative difference below which a number counts as unchanged."""
@@ -43,8 +43,8 @@ sliding, and its stiffness from end to end."""
 class MeasuredChange:
     """A measured quantity `before` and `after` the conversion [unit], and its error.
 
-    The error is relative to static friction for curves, and to the number itself for numbers. The quantity is kept if
-    the error is below `allowed`. The `amplitude` [m] is that of a loop.
+    The error is relative to static friction for curves, and relative to the number itself for numbers. The quantity is
+    kept if the error is below `allowed`. `amplitude` [m] is that of a hysteresis loop.
     """
 
     kind: MeasuredKind
@@ -66,8 +66,8 @@ class LawConversion:
     """A stage converted to another friction law.
 
     It has the source, the compared quantities, and the keys that the measurements leave open, with their ranges [SI].
-    It names the condition of passivity that the law violates ("" if it is passive). `points` are the measured points of
-    the virgin curve, unless the curve is that of the source's law.
+    It names the condition of passivity that the law violates ("" if it is passive). `points` are measured points of the
+    virgin curve (None: the curve is that of the source's law).
     """
 
     stage: Stage
@@ -159,7 +159,8 @@ def compared(
 ) -> LawConversion:
     """Compare a stage `made` from another with the friction measured `before`.
 
-    The measurement may be given by `points`. The result includes the keys that it leaves open in the new stage.
+    `points` are the measured points of the virgin curve, if there are any. The result includes the keys that the
+    measurement leaves open in the new stage.
     """
     flat = made.flat()
     after = measure_friction(flat)
@@ -176,7 +177,10 @@ def compared(
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
-    """Yield area and stiffness of slow loops under both laws, at fractions of the deflection at break-away."""
+    """Yield the changes of area and stiffness of slow loops between both laws.
+
+    The loops have fractions of the deflection at break-away as amplitudes.
+    """
     settings = StudySettings.current()
     deflection, speed = before.levels.static / before.stiffness, settings.loop_speed * before.levels.stribeck_velocity
     for share in settings.loop_amplitudes:
@@ -218,7 +222,7 @@ def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> Measu
 
 
 def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
-    """Return steady friction at the largest difference of both curves, forward and back."""
+    """Return steady friction before and after, where both curves differ most, forward or back."""
     speeds = SPEEDS * before.levels.stribeck_velocity
     old, new = (
         np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
@@ -229,7 +233,7 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """Return the virgin curve at the largest difference of both, or of the scattered points."""
+    """Return the virgin curve before and after, where it differs most from the curve or the points."""
     settings = StudySettings.current()
     if not after.stiffness:
         return MeasuredChange(

@@ -1,4 +1,4 @@
-"""Compute hysteresis loops of friction laws: force over a slow motion back and forth, before sliding."""
+"""Compute hysteresis loops of friction laws: force over a slow motion to and fro, before sliding."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class HysteresisLoop:
-    """A loop of force over displacement between `amplitude` [m] to either side of rest.
+    """A loop of force over displacement, with an `amplitude` [m] to either side of rest.
 
     It encloses the `area` [J], the energy lost in one period. `stiffness` [N/m] is the difference of the forces at both
-    ends over that of the displacements.
+    ends, divided by the difference of the displacements.
     """
 
     amplitude: float
@@ -36,7 +36,7 @@ def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> 
     settings = StudySettings.current()
     law, points = flat["friction.model"], settings.points_of_a_loop
     shape = kernel(Dragged(law, friction_law(law).variant(flat)))
-    # a quarter, then whole loops from one end: triangles, so that the speed is the same all along
+    # first a quarter, then whole loops from one end, as triangles with the same speed throughout
     phase = np.arange(points // 4 + settings.loop_periods * points + 1) / points
     place = amplitude * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * phase))
     inputs = Inputs(place, np.zeros(len(place)), 4 * amplitude / speed / points)

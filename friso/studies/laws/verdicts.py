@@ -1,4 +1,4 @@
-"""Judge a stage under every friction law that keeps its measured friction."""
+"""Judge a stage under each friction law that keeps its measured friction."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "vi
 
 @dataclass(frozen=True)
 class Trial:
-    """A stage under a law, with the keys `drawn` [SI] from those left open, and its cases.
+    """A stage under a law, and its cases by `friso.hunting.check`.
 
-    See `friso.hunting.check`.
+    `drawn` are the keys [SI] that the measurements leave open, with the values chosen for this trial.
     """
 
     stage: Stage
@@ -52,11 +52,11 @@ class Trial:
         return shown.verdict != "failed" and shown.judgement.hunting.certain
 
     def edge_sought(self, case: str) -> bool:
-        """Tell whether the search for the edge in a case found one or ended without one."""
+        """Tell whether the search for the edge in a case came to its end, with or without an edge."""
         shown = self.cases[case]
         judgement = shown.judgement
         unsought = shown.verdict == "failed" or CheckPart.BANDWIDTHS in judgement.given_up
-        unsought |= judgement.observed and judgement.hunting.target is None  # its own motion alone swings on
+        unsought |= judgement.observed and judgement.hunting.target is None  # only its own motion keeps swinging
         return judgement.margin is not None or not unsought
 
 
@@ -101,8 +101,8 @@ class LawVerdict:
     def edges(self, case: str) -> tuple[float, float] | None:
         """Return the lowest and highest edge of hunting [Hz] in a case; None without any.
 
-        They are factors of the bandwidth if there is no crossover. A certain edge extends by its error to both sides,
-        an uncertain one up to where no attractor was found.
+        Edges are factors of the bandwidth if there is no crossover. A certain edge is widened by its error to both
+        sides, an uncertain one up to where no attractor was found.
         """
         margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
         units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
@@ -134,7 +134,10 @@ class LawVerdict:
 
 @dataclass(frozen=True)
 class VerdictsByLaw:
-    """The verdicts by law, the stage's own first, and the laws `left_out`, with the quantities that they lose."""
+    """The verdicts by law, the stage's own first.
+
+    `left_out` lists the laws that do not keep the measured friction, with the quantities that they lose.
+    """
 
     stage: Stage
     verdicts: tuple[LawVerdict, ...]
@@ -146,7 +149,10 @@ class VerdictsByLaw:
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Tell whether the stage hunts in a case under all laws; None if that depends on the law or is not certain."""
+        """Tell whether the stage hunts in a case under all laws.
+
+        The result is None if that depends on the law or is not certain.
+        """
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
@@ -165,8 +171,8 @@ class VerdictsByLaw:
     def deciding(self, case: str) -> list[str]:
         """Return the experiments that would decide between different answers of friction laws.
 
-        If the answer depends on keys left open in a law, they are the experiments that determine these keys. Otherwise
-        they separate laws that disagree, or are not certain, from the others.
+        If the answer depends on keys left open in a law, these experiments determine the keys. Otherwise they separate
+        laws that disagree, or are not certain, from the others.
         """
         if self.hunts(case) is not None or not self.answers(case):
             return []
@@ -213,7 +219,10 @@ def verdicts_by_law(
 
 
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
-    """Return the stage under its own and other laws that keep its measured friction, and what the others lose."""
+    """Return the stage under all laws that keep its measured friction, its own first.
+
+    Also returns what the other laws lose.
+    """
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
     left_out: dict[str, tuple[MeasuredKind, ...]] = {}
@@ -225,7 +234,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
         except InputError:
             if stage.conditions is None:
                 raise
-            left_out[law] = ("conditions",)  # that the law cannot follow
+            left_out[law] = ("conditions",)  # the law cannot follow them
             continue
         lost: tuple[MeasuredKind, ...] = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
         if lost:
@@ -236,11 +245,11 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 
 
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
-    """Return the friction of stages under every other law that keeps the measured friction of each.
+    """Return the friction of stages under each other law that keeps their measured friction.
 
-    The stages differ in numbers of their friction. Friction is given as converted and at both ends of keys left open,
-    by the names of law and key. Laws that keep it for some stages only are dropped. Raises InputError for a law that
-    does not declare measurable friction.
+    The stages differ in numbers of their friction. Friction is given as converted, and at both ends of the range of
+    each key left open, by the names of law and key. Laws that keep the measured friction of some stages only are left
+    out. Raises InputError for a law that does not declare measurable friction.
     """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
@@ -266,9 +275,9 @@ def _together(values: Sequence[Any]) -> Any:
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """Return the values [SI] to try of keys that the measurements leave open.
+    """Return the values [SI] to try for keys that the measurements leave open, by name of the trial.
 
-    They are as converted, "", and at the "least" and "most" of the ranges; the stage's own law has one trial.
+    "" is as converted; "least" and "most" are at the ends of the range of a key. The stage's own law has one trial.
     """
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:

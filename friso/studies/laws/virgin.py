@@ -1,4 +1,7 @@
-"""Read a measured virgin curve: points of force over displacement from rest, in place of that of a law."""
+"""Read a measured virgin curve: points of force over displacement from rest.
+
+It replaces the virgin curve of the stage's friction law.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +24,15 @@ EXAMPLE = "displacement [um],force [N]"
 
 
 ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
-"""Displacements at which the force may begin, in units of that at a third of static friction."""
+"""Displacements at which the force may begin, relative to the displacement at a third of static friction."""
 
 
 @dataclass(frozen=True)
 class VirginPoints:
     """Points of a virgin curve.
 
-    `displacement` [m] and `force` [N] have the shape (n,). The standard deviation is that of the scatter of the force
-    [N]. The range of the initial slope [N/m] reaches up to infinity if the points lie too far from rest.
+    `displacement` [m] and `force` [N] have the shape (n,). `scatter` [N] is the standard deviation of the force about a
+    curve. The range of the initial slope [N/m] reaches to infinity if the points lie too far from rest.
     """
 
     displacement: np.ndarray
@@ -38,7 +41,10 @@ class VirginPoints:
     stiffness: tuple[float, float]
 
     def means(self, force: np.ndarray) -> np.ndarray:
-        """Average forces [N] at the displacements, shape (n,), over enough neighbouring points to suppress scatter."""
+        """Return forces [N] at the displacements, shape (n,), averaged over neighbouring points.
+
+        The average is over enough points to suppress scatter.
+        """
         return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
 
     @property
@@ -50,15 +56,15 @@ class VirginPoints:
 
     @property
     def usual(self) -> float:
-        """Return the expected largest deviation [N] of the points by scatter alone."""
+        """Return the largest deviation [N] of the points that scatter alone should cause."""
         return self.scatter * float(np.sqrt(2 * np.log(len(self.force))))
 
 
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
     """Read displacement [m] from rest and force [N], both (n,), from any log format.
 
-    The file has one channel of each, recognised by their units on such an axis. Raises InputError, LogError for a file
-    that holds none.
+    The file has one channel of each, recognised by their units for this `kind` of axis. Raises InputError or LogError
+    for a file that holds none.
     """
     settings = StudySettings.current()
     channels = read_table(Path(path)).channels
@@ -115,14 +121,14 @@ def with_virgin_curve(
     if not settings.reached_friction * static <= end <= static / settings.reached_friction:
         actual = f"points up to {end:.4g}, where friction.static is {static:.4g} (SI)"
         raise InputError("--virgin", actual, "points up to break-away", '--set friction.static="3 N"')
-    away = displacement != 0  # at rest a point says what the sensor shows there
+    away = displacement != 0  # the point at rest only shows the sensor's offset
     moved, rising = displacement[away], force[away]
     fits = list(concave_fits(moved, rising, static))
     fit, likeliest = (
         min(fits, key=lambda fit: fit.misfit + settings.number_gain * fit.free),
         min(fit.akaike for fit in fits),
     )
-    if len(moved) > settings.most_knots:  # many points tell where the force begins, if displacement 0 is elsewhere
+    if len(moved) > settings.most_knots:  # many points show where the force begins, if not at displacement 0
         third = np.interp(settings.first_friction * static, fit(np.sort(moved)), np.sort(moved))
         fits += [other for share in ELSEWHERE for other in concave_fits(moved - share * third, rising, static)]
         likeliest = min(likeliest, *(other.akaike for other in fits))
@@ -137,7 +143,7 @@ def with_virgin_curve(
         np.count_nonzero(moved[first] <= fit.corners[0]) < 2
         or fit(moved[first][:1])[0] > settings.first_friction * static
     )
-    high += high - fit.slope  # what is left out near rest makes curves softer, never stiffer
+    high += high - fit.slope  # leaving out points near rest makes a curve softer, never stiffer
     ends = max(low, 0.0), np.inf if blind else high
     points = VirginPoints(displacement, force, _scatter(rising - fit(moved)), ends)
     at_rest = force[~away]

@@ -18,22 +18,23 @@ from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import standing
 
 PERIOD, PERIODS = 8.0, 8
-"""Length of a period of the multisine in periods of the crossover, the inverse of its lowest line (1 Hz on the thesis's
-rig), and number of periods."""
+"""Period of the multisine in periods of the crossover, and number of periods. The period is the inverse of the lowest
+line (1 Hz on the thesis's rig)."""
 
 FINEST = 0.4
-"""Highest line over the sampling rate of the log."""
+"""Highest line of the multisine over the sampling rate of the log."""
 
 PHASES = int.from_bytes(b"sines")
-"""Second half of the random generator's key for the phases."""
+"""Second half of the random generator's key for the phases of the multisine."""
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """Settings of the excitation of a frequency response.
+    """Excitation of a frequency response.
 
-    They are the RMS of the injected force over static friction, the highest line over the crossover, the approximate
-    number of lines, evenly spaced in the logarithm, and samples of the log per period of the crossover.
+    `strength` is the RMS of the injected force over static friction. Further fields are the highest line over the
+    crossover, the approximate number of lines, spaced evenly in the logarithm, and samples of the log per period of the
+    crossover.
     """
 
     strength: float
@@ -81,7 +82,7 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
-    """Return the indirect estimate from commanded force to position, over realisations.
+    """Estimate the response from commanded force to position, indirectly, over realisations.
 
     Raises InputError for a loop that was not stable.
     """
@@ -92,7 +93,7 @@ def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
 
 
 def loop(log: RigLog) -> FrequencyResponse:
-    """Return the open loop: the controller's force over the total force, sign reversed."""
+    """Estimate the open loop: the controller's force over the total force, sign reversed."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
     record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
     return multisine([record], None, Channels("error", "1", "loop", "1"))

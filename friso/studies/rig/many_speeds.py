@@ -1,9 +1,9 @@
-"""Run passes at many speeds with a locked joint and a faster controller: the whole curve of friction over velocity.
+"""Run passes at many speeds with a locked joint: the whole curve of friction over velocity.
 
 Where friction falls with speed a slow loop sticks and slips, so its passes show no steady friction. A faster controller
-damps more: of a few settings the fastest is taken at which most passes are steady. All passes cover one stretch, so
-that they differ in speed and not in place; fast ones begin before it and end behind, if necessary beyond the stage's
-own travel, because the rig's rail has no ends.
+damps more, so a few settings are tried, and the fastest one at which most passes are steady is taken. All passes cover
+one stretch, so that they differ in speed and not in place. Fast passes begin before the stretch and end behind it, if
+necessary beyond the stage's own travel, because the rig's rail has no ends.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ MOST = 0.5
 """Least fraction of steady passes at an accepted setting."""
 
 SHARED, PLACES = 1 / 8, 3
-"""Common part of all ways over the longest, and number of places along the travel (friso's choice)."""
+"""Stretch that all passes cover, as a fraction of the longest, and number of places along the travel (friso's
+choice)."""
 
 STANDS, SAMPLES = 16.0, 62.5
 """Periods of the crossover for which the reference stands between passes, and samples of the log per period of the
@@ -52,10 +53,10 @@ stage's own crossover (2 ms)."""
 
 @dataclass(frozen=True)
 class PlaceOnRail:
-    """Passes on one stretch of the rail.
+    """Passes over one stretch of the rail.
 
-    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], over that stretch.
-    Both have the shape (n,).
+    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], both of shape
+    (n,), over that stretch.
     """
 
     log: RigLog
@@ -120,13 +121,13 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 
 
 def _begins(stage: Stage) -> np.ndarray:
-    """Return the beginnings of the stretches [m]."""
+    """Return where the stretches begin [m]."""
     low, high = travel(stage)
     return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
 
 def controller_speeds(stage: Stage) -> np.ndarray:
-    """Return the speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
+    """Return the speeds [m/s], shape (`SPEEDS`,), for a stage whose controller was made faster."""
     top = longest_travel(stage) * pace(stage) / SHORTEST
     return np.geomspace(top / RATIO, top, SPEEDS)
 

@@ -58,8 +58,8 @@ def duration(stage: Stage) -> float:
 def move(stage: Stage) -> MoveTask:
     """Return the move from 0 with the acceleration of the stage's motion, standing afterwards.
 
-    For a motion that states none, it has an acceleration that the loop can just follow (a move then takes two of its
-    time constants).
+    A motion that states no acceleration gets one that the loop can just follow: a move then takes two time constants of
+    the loop.
     """
     flat, travel = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
@@ -69,7 +69,7 @@ def move(stage: Stage) -> MoveTask:
 
 
 def released(stage: Stage, displacement: float) -> MoveTask:
-    """Return a release at the end of the move, `displacement` [m] beside it."""
+    """Return a release at the end of the move, from `displacement` [m] beside it."""
     return MoveTask(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
 
 
@@ -122,14 +122,17 @@ def rails(stage: Stage) -> np.ndarray:
 
 
 def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
-    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,), with rails varying fastest."""
+    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,).
+
+    Rails vary fastest.
+    """
     count = len(next(iter(cases.values())))
     repeated = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     return repeated if stage.rail is None else {**repeated, "rail.seed": np.tile(seeds, count)}
 
 
 def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
-    """Return seeds of the noise of cases on machines; a machine has one seed in all cases."""
+    """Return noise seeds for cases on machines; a machine has one seed in all cases."""
     return [seed + machine for _ in range(cases) for machine in range(machines)]
 
 
@@ -183,7 +186,7 @@ class RailRuns:
 
 
 def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> RecordedRuns:
-    """Return a few runs with all samples."""
+    """Run a task once for each seed, and keep all samples."""
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
 
@@ -213,7 +216,7 @@ def run_moves(
 
 
 def rail_runs(recorded: RecordedRuns) -> RailRuns:
-    """Evaluate the runs of a chunk, by the logged position."""
+    """Evaluate the logged positions of a chunk of runs."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]
     deviation[failed] = 0.0
@@ -245,8 +248,8 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
     """Return the shape of swings in the last half of a run: above, below, rising, and two scatters.
 
-    They follow from turning points, times [s] and values [m]; the scatters are those of period and of height, as in
-    `RailRuns`.
+    `RailRuns` describes them. They follow from turning points, times [s] and values [m]; the scatters are those of
+    period and height.
     """
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):

@@ -21,9 +21,9 @@ from friso.virtual_rig.run import RecordedRuns
 class RigLog:
     """A log as the drive writes it, with the truth behind it.
 
-    It has a name, the kind of experiment for `friso identify` (None: it is recognised), the sample time [s], logged
-    and true SI arrays of shape (n,) by role, the stage that ran, the seed of its noise, and why the run ended early
-    (empty: it did not).
+    It has a name, the kind of experiment for `friso identify` (None: recognised from the log), the sample time [s],
+    logged and true SI arrays of shape (n,) by role, the stage that ran, the seed of its noise, and why the run ended
+    early ("": it did not).
     """
 
     name: str
@@ -43,7 +43,7 @@ class RigLog:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of an experiment on a stage: logs, a result of its own class, and `notes`."""
+    """Outcome of an experiment on a stage: logs, a result of the experiment's own class, and `notes`."""
 
     experiment: str
     stage: Stage
@@ -77,12 +77,12 @@ def stopped(log: RigLog) -> InputError:
 
 
 WINDOWS, SATURATED = 20, 0.1
-"""Parts of a log in the test for stability, and the fraction of a part that the command of an unstable loop spends at
-either limit."""
+"""Number of parts into which a log is divided in the test for stability, and the fraction of a part that the command of
+an unstable loop spends at either limit."""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
-    """Return the number of samples after which a command [N], (n,), only swings between limits.
+    """Return the number of samples after which a command [N], (n,), only swings between its limits.
 
     It is 0 if the command comes to rest, or has no limits.
     """

@@ -22,7 +22,7 @@ WIDE = 8.0
 """Stroke during identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
 
 WAY = 5 / 3
-"""Way at constant speed over that of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
+"""Way at constant speed over the length of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
 
 ALPHA = 0.1
 """Alpha of the van Dijk controller to which plain gains are compared, as in the thesis."""
@@ -35,7 +35,7 @@ _FREE = 'stiffness = "2.4 N/mm", damping = "0.5 N*s/m", stroke = "1 mm"'
 
 
 def jointed(stage: Stage) -> Stage:
-    """Return the stage itself. Raises InputError for one without a joint."""
+    """Return the stage unchanged. Raises InputError if it has no joint."""
     if stage.joint is None:
         raise InputError("joint", "no [joint]", "a stage with a joint", '[joint] stiffness = "2.4 N/mm"')
     return stage
@@ -56,7 +56,7 @@ def freed(stage: Stage) -> Stage:
 def free_stage(stage: Stage) -> Stage:
     """Return the stage with its joint free.
 
-    Raises InputError if it has none, or lacks the keys for that.
+    Raises InputError if it has no joint, or lacks the keys of a free one.
     """
     free = jointed(stage).variants().get("free")
     if free is None:
@@ -88,9 +88,9 @@ def friction(stage: Stage) -> float:
 
 
 def travel(stage: Stage) -> tuple[float, float]:
-    """Return the ends [m] of the stage's own motion.
+    """Return the two ends [m] of the stage's own motion.
 
-    A motion that does not move has a hundred strokes to either side.
+    If the motion does not move, the travel is a hundred strokes to either side.
     """
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
@@ -109,6 +109,6 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def interval(stage: Stage, length: float) -> float:
-    """Return the sample time of a log [s], at most `length`, a whole number of the drive's samples."""
+    """Return the sample time of a log [s]: at most `length`, and a whole number of the drive's samples."""
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

@@ -1,7 +1,7 @@
-"""Run slow sliding with a locked joint, where friction falls so steeply that no controller holds a constant speed.
+"""Run slow sliding with a locked joint, where no controller holds a constant speed.
 
-Short, finely logged passes follow those of `many_speeds`, at speeds at the limit of steady motion: the motion swings
-through the whole falling branch.
+There friction falls steeply with speed. Short, finely logged passes follow those of `many_speeds`, at speeds at the
+limit of steady motion: the motion swings through the whole falling branch.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
 
 UNSTEADY, STEADY, PLACES = 2, 1, 8
-"""Numbers of speeds: of the fastest that were not steady, and of the slowest that were; and number of places along the
-travel, because each log shows the friction of a few millimetres."""
+"""Numbers of speeds: UNSTEADY, the fastest that were not steady, and STEADY, the slowest that were; and number of
+places along the travel, because each log shows the friction of a few millimetres."""
 
 APART = 4
 """Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
@@ -35,13 +35,13 @@ POINTS = 500
 """Points of a way for its mean friction."""
 
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
-"""Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4
-s, 0.125 s and 0.1 ms on the thesis's rig)."""
+"""Periods of the stage's own crossover for which each speed lasts, and for which the reference stands before; samples
+per period (0.4 s, 0.125 s and 0.1 ms on the thesis's rig)."""
 
 
 @dataclass(frozen=True)
 class Slow:
-    """The log of slow sliding at a place, and its evaluation with true mass and bristles.
+    """Log of slow sliding at a place, and its evaluation with true mass and bristles.
 
     The true mean Coulomb and static friction [N] over its way have the shape (2,).
     """

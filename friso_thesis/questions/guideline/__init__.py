@@ -1,4 +1,4 @@
-"""The design guideline: two formulas for the crossover at which hunting ends, with their errors."""
+"""Answer with the design guideline: two formulas for the crossover at which hunting ends."""
 
 from friso.interface.question import WHERE, Question
 

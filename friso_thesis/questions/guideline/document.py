@@ -1,4 +1,4 @@
-"""The JSON document of `friso guideline`."""
+"""Build the JSON document of `friso guideline`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from friso_thesis.studies.guideline.worked import WorkedDesign
 
 
 def guideline_document(guideline: Guideline) -> dict[str, Any]:
-    """Laws, errors, checks and the worked steps, ready for JSON."""
+    """Return laws, errors, checks and the worked steps, ready for JSON."""
     steps = guideline.worked
     return plain_json(
         {

@@ -1,4 +1,7 @@
-"""The charts of the guideline: the edge collapsed onto the rates that make it, laws against computed edges, the rig."""
+"""Draw the charts of the guideline.
+
+They show the edge collapsed onto the rates that determine it, laws against computed edges, and the rig.
+"""
 
 from __future__ import annotations
 
@@ -37,15 +40,14 @@ ENDS = {
 }
 HALVES = (Category("samples of the fit", LIGHT), Category("samples held out", BLUE))
 FULL = 1.0
-"""Joint force at full stroke, relative to static friction, from which the chart of the joint treats a stroke as ample.
-"""
+"""Joint force at full stroke, over static friction, from which the chart of the joint counts a stroke as ample."""
 
 
 SHARES = 5.0
 """Upper end of the chart of the stroke, as a multiple of the joint's effect."""
 
 FINER = 10
-"""Points of a drawn law per step between two computed edges."""
+"""Number of points of a drawn law per step between two computed edges."""
 
 
 def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
@@ -60,7 +62,7 @@ def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
 
 
 def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
-    """Return the edge of rigid masses over the ratio of their two rates."""
+    """Draw the edge of rigid masses over the ratio of their two rates."""
     sweep = guideline.locked.test.usable
     slip, drop = np.exp(guideline.locked.law.log_rates(sweep.values))
     mean = np.sqrt(slip * drop)
@@ -81,8 +83,10 @@ def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
 
 
 def _free(guideline: Guideline) -> Figure:
-    """Return the edge with a free joint of ample stroke over the rate of the joint,
-    both over the locked edge."""
+    """Draw the edge with a free joint of ample stroke over the rate of the joint.
+
+    Both are relative to the locked edge.
+    """
     sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
     x, y = joint / sweep.locked, sweep.edge / sweep.locked
@@ -102,11 +106,11 @@ def _free(guideline: Guideline) -> Figure:
 
 
 def _stroke(guideline: Guideline) -> Figure:
-    """Return the fraction of a joint's effect that is left with its stroke."""
+    """Draw the fraction of a joint's effect that its stroke leaves."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
     joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2
-    felt = joint < sweep.locked  # else the effect is small, and its share a small difference
+    felt = joint < sweep.locked  # a small effect would make the fraction uncertain
     x = (joint / stroke) ** 2
     line = np.geomspace(*_ends(x[felt]), 200)
     y = effect[felt]
@@ -155,7 +159,7 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
 
 
 def _thesis_rig(guideline: Guideline) -> Figure:
-    """Return the thesis rig with one thing changed at a time."""
+    """Draw the edges of the thesis's rig with one thing changed at a time."""
     laws = Laws(guideline.locked.law, guideline.free.law)
     panels = tuple(_studied(title, x, guideline.worked.studies[name], laws) for name, (title, x) in PANELS.items())
     flat = plain_rig("joint")
@@ -204,8 +208,7 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 
 def _both(fit: Fit, which: object) -> Sweep:
-    """Return the samples of fit and test together that have an edge and for which `which` is
-    true of their groups."""
+    """Return the samples of fit and test together that have an edge and groups selected by `which`."""
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 
 

@@ -1,4 +1,4 @@
-"""The guideline as a page with its charts, and its edges as a table."""
+"""Write the guideline as a page with its charts, and its edges as a table."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PAGE, TABLE = "guideline.md", "guideline_edges.csv"
 
 
 FAR = 1.5
-"""Ratio of computed edge and law from which the edge counts as far off."""
+"""Ratio of computed edge to law from which the edge counts as far off."""
 
 RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**ROUNDS - 1 for grid in (LOCKED_GRID, FREE_GRID))
 """Relative width of the last step of a bisection."""
@@ -102,11 +102,11 @@ def guideline_page(guideline: Guideline) -> str:
 
 
 ONE_WINDOW = "with one window (a diagnosis)"
-"""Name of the table rows of samples in which a cycle attracts up to the edge without a gap."""
+"""Name of the table rows for samples whose cycle attracts up to the edge without a gap."""
 
 
 def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
-    """Errors on held-out samples, by which they are."""
+    """Return the errors on held-out samples, by the name of the group of samples."""
     rows = [
         ("joint locked", guideline.locked.on_test),
         (f"of these {ONE_WINDOW}", guideline.held_out(False, _one_window)),
@@ -126,8 +126,11 @@ def _one_window(sweep: Sweep) -> np.ndarray:
 
 
 def _worst(guideline: Guideline) -> dict[str, Any] | None:
-    """Among the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the
-    ends of their gap and stribeck groups, and how many of which kind; None without any."""
+    """Summarise the samples whose locked edge is far from the law, fitted and held out.
+
+    Returns how many there are, the ends of their gap and stribeck groups, and how many of each kind; None if there are
+    none.
+    """
     used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
     far = used.take(off > np.log(FAR))
@@ -144,8 +147,10 @@ def _between(low: float, high: float) -> str:
 
 
 def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
-    """One row per group: how it is written, what it means, its range in the sweeps, and its value for the thesis's
-    rig."""
+    """Return one row for each group.
+
+    A row has the group's formula, its meaning, its range in the sweeps, and its value for the thesis's rig.
+    """
     ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
     used = guideline.free.sweep.usable
     ranges["joint"] = _span(used.values["joint"])
@@ -170,19 +175,21 @@ def _span(x: np.ndarray) -> tuple[float, float]:
 
 
 def _span_text(ends: tuple[float, float]) -> str:
-    """Return the ends of a range, or the number that it is."""
+    """Return the two ends of a range in words, or a single number."""
     low, high = (number(end) for end in ends)
     return low if low == high else f"{low} to {high}"
 
 
 def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, float]]:
-    """Return what a study varies, the edge by the law, and that computed."""
+    """Return rows of the value that a study varies, the edge by the law, and the computed edge."""
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 
 
 def edges_table(guideline: Guideline) -> str:
-    """Return all samples with their groups and edges, as CSV; four digits,
-    which is more than edges are known to."""
+    """Return all samples with their groups and edges, as CSV.
+
+    Numbers have four digits, more than the accuracy of an edge.
+    """
     sweeps = {
         ("locked", "fit"): guideline.locked.fit,
         ("locked", "held out"): guideline.locked.test,

@@ -1,4 +1,4 @@
-"""The design guideline, every number and chart of it computed anew."""
+"""Compute every number and chart of the design guideline anew."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The laws of the guideline as formulas, and its numbers as text."""
+"""Write the laws of the guideline as formulas, and its numbers as text."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ BASES = {
     "joint": "sqrt(k_j/m)",
     "stroke": "sqrt(F_s/(m S_j))",
 }
-"""Formula of each rate [rad/s], without its factor and powers."""
+"""Formula of each rate [rad/s], without its factor and fitted powers."""
 
 
 RULE = 2.0
-"""Largest ratio of multiples of the crossover that still count as one rule."""
+"""Largest ratio between multiples of the crossover that still make one rule."""
 
 
 def formulas(guideline: Guideline) -> str:
-    """Both laws as lines of a formula, to be used by hand."""
+    """Return both laws as formulas for use by hand, line by line."""
     locked, free = guideline.locked.law, guideline.free.law
     lines = [
         *_rates(locked),
@@ -60,7 +60,7 @@ def _power(group: str, exponent: float) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number to so many digits; a dash where there is none."""
+    """Return a number with `digits` digits; a dash for NaN."""
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
@@ -72,7 +72,7 @@ def log_error(off: float) -> str:
 
 
 def accuracy(guideline: Guideline) -> list[str]:
-    """Return how well each law predicts the edge of hunting of stages that it was not fitted to."""
+    """Say how well each law predicts the edge of hunting of stages that it was not fitted to."""
     fits = (("locked", guideline.locked.on_test), ("free", guideline.free.on_test))
     return [
         f"The law for the {case} joint predicts the edge of hunting of {errors.count} stages that it was not fitted to "
@@ -82,7 +82,7 @@ def accuracy(guideline: Guideline) -> list[str]:
 
 
 def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
-    """Return how far the parasitic mode moves the edge of hunting."""
+    """Say how far the parasitic mode moves the edge of hunting."""
     edges = [case.computed for case in cases if math.isfinite(case.computed)]
     if not edges:
         return "No edge is known with any of these modes."
@@ -93,8 +93,7 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
     """Say where the ranges of crossovers end, by the damping ratio of the mode.
 
-    They are given with the joint locked and free. It is also said whether one multiple of the crossover is a rule for
-    all modes.
+    The joint is locked, then free. Also say whether one multiple of the crossover is a rule for all modes.
     """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
@@ -133,5 +132,5 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def sentences(guideline: Guideline) -> list[str]:
-    """Return how accurate the laws are."""
+    """Say how accurate the laws are."""
     return accuracy(guideline)

@@ -1,4 +1,4 @@
-"""The thesis's figures and claims, computed again and judged."""
+"""Answer with the thesis's figures and claims, computed again and judged."""
 
 from friso.interface.question import WHY, Question
 

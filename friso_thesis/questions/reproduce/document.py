@@ -1,4 +1,4 @@
-"""The JSON document of `friso reproduce`: the claims of the thesis with their judgements."""
+"""Build the JSON document of `friso reproduce`: the claims of the thesis with their judgements."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def conclusion(reproduction: Reproduction) -> str:
-    """Return how many claims of the thesis hold."""
+    """Say how many claims of the thesis hold."""
     counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
     parts = [
         f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
@@ -42,12 +42,14 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("cannot be decided", "cannot be decided by simulation", "cannot be decided by simulation"),
     ("not yet covered", "is not covered", "are not covered"),
 )
-"""Verb of each judgement, for one claim and for several."""
+"""Verbs for each judgement, of one claim and of several."""
 
 
 def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Any]:
-    """Return all claims with their judgements, ready for JSON;
-    how they were judged stands before them. With those under each friction law, where they were asked."""
+    """Return all claims with their judgements, ready for JSON.
+
+    A note before them says how they were judged. With `laws`, judgements under each friction law are added.
+    """
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     document = {
@@ -99,7 +101,7 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
 
 
 def _ways(verdict: ClaimVerdict) -> dict[str, ClaimJudgement]:
-    """Return the judgement by the thesis's count, and by what attracts the stages where that enters."""
+    """Return the judgement by the thesis's count and, if that matters, by what attracts the stages."""
     findings = {COUNT: verdict.finding, CYCLE: verdict.attracts}
     return {way: finding.judgement for way, finding in findings.items() if finding}
 
@@ -117,7 +119,7 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _space(space: ClaimInSpace) -> dict[str, Any]:
-    """Return a claim over the joint draws."""
+    """Return the result on a claim over the joint draws."""
     return {
         "draws": space.draws,
         "undecided": space.undecided,

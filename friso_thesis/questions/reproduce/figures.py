@@ -37,16 +37,15 @@ MARKER = (
     "The marker is friso's evaluation point: crossover, friction, stiffness and masses as the thesis prints them; "
     "alpha, beta, path, stroke and limiter damping by friso's choice, since its own markers are not printed in numbers."
 )
-"""Note below every map."""
+"""Note below each map."""
 
 _HUNTING = ("edge of the attracting cycle", VERMILLION)
 _PAIR = ("edge of asymmetric cycles at its basin", PINK)
-_SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5 and 13
+_SHOWN_FROM = 6.0  # [s] the return move of Fig. 5 and 13 is over by then
 
 
 def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
-    """Return the figures by their number in the thesis, in its order,
-    those whose studies were run."""
+    """Return the figures whose studies were run, by their number in the thesis and in its order."""
     figures = {**_in_time(reproduction), **loop_figures(reproduction)}
     if reproduction.experiments is not None:
         figures |= rig_figures(reproduction.experiments, reproduction.experimented)
@@ -84,8 +83,10 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
 
 
 def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
-    """Return the map with the curves on which the hunting cycle stops attracting,
-    and on which asymmetric ones appear."""
+    """Return the map with two kinds of curves.
+
+    On the first, the hunting cycle stops attracting; on the second, asymmetric cycles appear.
+    """
     figures = reproduction.cycles.get(study.name)
     if figures is None:
         return panel
@@ -99,14 +100,14 @@ def _line(edge: Edge) -> Series:
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
-    """Return the maps of a study by title: one, or Fig. 14B at the two tolerances."""
+    """Return the maps of a study by title: one map, or for Fig. 14B one for each of two tolerances."""
     if study.panel == "14B":
         return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}
     return {f"{letter}: {study.title}": reproduction.maps[study.name]}
 
 
 def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
-    """Return the figures of single runs, of those that were made."""
+    """Return the figures of the single runs that were made."""
     made = reproduction.responses.keys()
     figures = {"5": _response(reproduction)} if "locked" in made else {}
     return figures | ({"13": _shares(reproduction)} if {WIDE, NARROW} <= made else {})
@@ -137,7 +138,7 @@ def _response(reproduction: Reproduction) -> Figure:
 
 
 def _shares(reproduction: Reproduction) -> Figure:
-    """Draw the P, I and D terms of the force on the locked rig, the wide gap above the narrow one."""
+    """Draw the P, I and D terms of the force on the locked rig, for the wide gap above the narrow one."""
     panels = []
     for name in (WIDE, NARROW):
         trace = reproduction.responses[name].trace

@@ -1,4 +1,7 @@
-"""The first screen of the page of `friso reproduce`: what is right, what is right for another reason, and slips."""
+"""Write the first screen of the page of `friso reproduce`.
+
+It shows what is right, what is right for another reason, and slips.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Remark:
-    """A remark on a claim: what is to be said, the number of the criterion (from 0) that shows it, whether that
-    criterion is met where the remark applies, and the command that shows more."""
+    """A remark on a claim.
+
+    It has the text, the number of the criterion (from 0) that supports it, whether that criterion must be met for the
+    remark to apply, and the command that shows more.
+    """
 
     claim: str
     part: int
@@ -81,7 +87,10 @@ class RemarkRow:
 
 
 def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[RemarkRow]:
-    """Return the remarks that apply: their criterion is judged in this run, as they say."""
+    """Return the remarks that apply.
+
+    A remark applies if this run has judged its criterion, with the result that the remark expects.
+    """
     rows = []
     for remark in of:
         finding = verdicts[remark.claim].finding
@@ -91,7 +100,7 @@ def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[
 
 
 def as_far(verdict: ClaimVerdict) -> str:
-    """Return how far a claim that holds could be judged, in brackets; "" if all of it was."""
+    """Return in brackets how far a claim that holds could be judged; "" if all of it was."""
     beyond = None in verdict.finding.pattern if verdict.finding else False
     return " (as far as simulation decides)" if beyond else ""
 

@@ -1,5 +1,4 @@
-"""Show the thesis's conclusions under other friction laws: a sentence, a table,
-the JSON document."""
+"""Show the thesis's conclusions under other friction laws: sentences, a table, the JSON document."""
 
 from __future__ import annotations
 
@@ -15,8 +14,7 @@ TITLE = "Conclusions of the thesis under each friction law"
 
 
 def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
-    """Return how many conclusions survive, which do not,
-    and which laws cannot say since they keep too little."""
+    """Say how many conclusions survive, which do not, and which laws keep too little to say."""
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
     others = ", ".join(laws.laws[1:])
     alike = f"{count - len(of_one)} of {count} conclusions have the same judgement"

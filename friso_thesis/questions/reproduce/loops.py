@@ -1,4 +1,4 @@
-"""The figures of the thesis that show plants and open loops over the frequency, from a reproduction to plain data."""
+"""Draw the thesis's figures of plants and open loops over frequency, from a reproduction."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ _SHOWN = {
         "The loop tuned to 8 Hz while the cart slides at a prescribed speed, limiter free. Dashed: not stable.",
     ),
 }
-"""Figures of the linear analysis that are figures of the thesis, by its number: name, title and caption."""
+"""Figures of the linear analysis that are also figures of the thesis: name, title and caption by the thesis's
+number."""
 
 
 def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
-    """Return the figures by their number in the thesis; none where no linear analysis was made."""
+    """Return the figures by their number in the thesis; none without a linear analysis."""
     if reproduction.linear is None or reproduction.bode is None:
         return {}
     by_name = {figure.name: figure for figure in bode_figures(reproduction.bode)}
@@ -66,7 +67,7 @@ def _free(loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]) -> Figure:
 def _of_loops(
     number: str, title: str, caption: str, loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]
 ) -> Figure:
-    """Draw magnitude and phase of the loops at every crossover, of the model and of the rig as built."""
+    """Draw magnitude and phase of the loops at every crossover, for the model and for the measured rig."""
     ends = loops.omega[0] / (2 * np.pi), loops.omega[-1] / (2 * np.pi)
     of_model = [ResponseCurve(response, f"tuned to {tuned:g} Hz", "") for tuned, response in loops.curves.items()]
     columns = [_panels("model", ends, [(loops.omega / (2 * np.pi), curve) for curve in of_model])]
@@ -89,10 +90,10 @@ MEASURED_CAPTION = (
 def _panels(title: str, ends: tuple[float, float], curves: Sequence[tuple[np.ndarray, ResponseCurve]]) -> list[Panel]:
     """Return panels of magnitude and phase of curves between the `ends` [Hz].
 
-    All curves have equally many frequencies [Hz].
+    All curves have the same number of frequencies [Hz].
     """
     x = Axis("Frequency", "Hz", (float(ends[0]), float(ends[1])), log=True)
-    shades = ramp(len(curves) + 1)  # its last shade is light
+    shades = ramp(len(curves) + 1)  # leave out its last shade, which is light
     responses = [curve.response for _, curve in curves]
     above, below = [], []
     for (hertz, curve), turn, shade in zip(curves, phases(responses), shades, strict=False):

@@ -51,8 +51,10 @@ class FigureSection:
 
 
 def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
-    """Return the page, a summary of one sheet, the claims,
-    and every figure as PNG and SVG in a folder of its own."""
+    """Return the page, a one-sheet summary, the claims, and every figure.
+
+    Figures are PNG and SVG files in a folder of their own.
+    """
     text = json.dumps(reproduce_document(reproduction, laws), indent=2, ensure_ascii=False, allow_nan=False)
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
@@ -65,8 +67,10 @@ def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = 
 
 
 def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
-    """Return the whole page: all claims at a glance,
-    then item by item in the order of the thesis. It opens offline."""
+    """Return the whole page: all claims at a glance, then item by item in the thesis's order.
+
+    It opens offline.
+    """
     verdicts = words.in_order(reproduction.verdicts)
     by_claim = {verdict.claim.id: verdict for verdict in verdicts}
     numbered = reproduction_figures(reproduction)
@@ -116,7 +120,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def claims_markdown(reproduction: Reproduction) -> str:
-    """Return all claims as a Markdown page, as the documentation shows a finished run."""
+    """Return all claims as a Markdown page, in which the documentation shows a finished run."""
     heads = ("Claim", "Where", "What the thesis claims, in short", "By its count", "By what attracts", "Holds in draws")
     rows = [heads, ("---",) * len(heads)]
     rows += [
@@ -144,9 +148,11 @@ def claims_markdown(reproduction: Reproduction) -> str:
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:
-    """Return the items in the order of the verdicts, each figure where its first claim stands,
-    those of no claim at the end; claims that are not covered stand in the table alone. A panel's claims, such as those
-    of "11A", stand with the figure."""
+    """Return the items in the order of the verdicts.
+
+    Each figure stands with its first claim, and figures without a claim at the end. A panel's claims, such as those of
+    "11A", stand with their figure. Claims that are not covered stand only in the table.
+    """
     groups: dict[str, list[ClaimVerdict]] = {}
     for verdict in verdicts:
         if verdict.finding:
@@ -164,22 +170,26 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) ->
 
 
 def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
-    """Return an item without a figure of its own, by where the thesis makes its claims,
-    and what they are about."""
+    """Return the title of an item without a figure.
+
+    It says where the thesis makes its claims, and what they are about.
+    """
     if place.isdigit():
         return f"Figure {place}"
     return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
 
 def _printed(figure: Figure) -> Markup:
-    """Return the figure for paper as a data address; maps as pixels,
-    since thousands of cells make megabytes of lines."""
+    """Return the figure for paper as a data address.
+
+    Maps are drawn in pixels, because thousands of cells as lines would make megabytes.
+    """
     if not any(panel.maps for panel in figure.panels):
         return print_image(figure)
     return print_image(figure, "png", noted=False)
 
 
 def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
-    """Return how many claims got each judgement, those that occur."""
+    """Return how many claims got each judgement, for judgements that occur."""
     parts = [verdict.judgement for verdict in verdicts]
     return {judgement: parts.count(judgement) for judgement in COLOURS if judgement in parts}

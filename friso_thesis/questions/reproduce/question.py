@@ -1,4 +1,4 @@
-"""The thesis's figures and claims, computed again and judged."""
+"""Compute and judge the thesis's figures and claims again."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 
 
 class ReproduceAnswer(Answer):
-    """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim; `laws`, where
-    asked, how its conclusions are judged under each friction law."""
+    """The thesis recomputed.
+
+    `result` is a `Reproduction` with maps, responses and a verdict on each claim. `laws`, if requested, tells how the
+    conclusions are judged under each friction law.
+    """
 
     laws: ConclusionsByLaw | None
 
@@ -33,8 +36,7 @@ class ReproduceAnswer(Answer):
         return reproduce_document(self.result, self.laws)
 
     def sentences(self) -> Sequence[str]:
-        """Return how many of the claims hold, which draw fits best,
-        and how many survive other friction laws."""
+        """Say how many claims hold, which draw fits best, and how many survive other friction laws."""
         from friso_thesis.questions.reproduce.laws import laws_sentences
         from friso_thesis.questions.reproduce.words import fit_sentence
 
@@ -83,7 +85,7 @@ class ReproduceAnswer(Answer):
 
 
 def _drawn(space: dict[str, Any] | None) -> str:
-    """Say in how many joint draws a claim holds; empty without draws."""
+    """Say in how many joint draws a claim holds; "" without draws."""
     return f"[{space['holds']} of {space['draws']} draws] " if space else ""
 
 

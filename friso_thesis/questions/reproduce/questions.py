@@ -1,5 +1,7 @@
-"""List the questions that the thesis leaves open, with the command that answers each,
-and its design method by steps."""
+"""List the questions that the thesis leaves open, with the command that answers each.
+
+Also list the steps of the thesis's design method.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    It has the place where it is `asked`, the `command` that answers it, the meaning of the result, and its `answer` on
-    the thesis's rig from findings on file.
+    It has the place where it is `asked`, the `command` that answers it, the meaning of the result, and its `answer` for
+    the thesis's rig, from stored findings.
     """
 
     asked: str
@@ -118,8 +120,7 @@ QUESTIONS: tuple[ThesisQuestion, ...] = (
 
 
 def question_rows() -> list[Sequence[str]]:
-    """Return the open questions, with the commands that answer them and the answers on the
-    thesis's rig."""
+    """Return the open questions, with commands that answer them, and answers for the thesis's rig."""
     return [(question.asked, question.command, question.shows, question.answer()) for question in QUESTIONS]
 
 
@@ -128,8 +129,11 @@ _PARASITIC, _LARGEST = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
-    """Return the steps of Sec. 3.4: what the thesis does, what friso finds at its values,
-    and what `friso design` makes of its specification (on file)."""
+    """Return the steps of Sec. 3.4.
+
+    Each has what the thesis does, what friso finds at the thesis's values, and what `friso design` makes of the
+    specification (stored).
+    """
     single = reproduction.linear.locked.single if reproduction.linear else None
     reached = (
         f"by Sec. 3.4.2 up to {single:.3g} Hz, where a mode reaches 0 dB too" if single else "not computed in this run"

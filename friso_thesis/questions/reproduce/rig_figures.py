@@ -1,4 +1,4 @@
-"""The figures of the thesis that show its rig, in its arrangement, as friso's virtual rig has them."""
+"""Draw the thesis's figures of its rig in its own arrangement, from friso's virtual rig."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _ZOOM = 2e-3  # [m] about the end of the move, Fig. 24B
 
 
 def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Figure]:
-    """Return the figures by their number in the thesis, those whose experiments were `made`."""
+    """Return the figures of the experiments that were `made`, by their number in the thesis."""
     drawn: dict[str, Figure] = {}
     for need, draw in _DRAWN.items():
         if need in made:
@@ -57,7 +57,7 @@ def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Fig
 
 
 def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
-    """Draw the measured plant with its joint locked, place by place, over the line of its mass."""
+    """Draw the measured plant with its joint locked, place by place, relative to the line of its mass."""
     hertz = np.array(FREQUENCIES)
     omega = 2 * np.pi * hertz
     line = experiments.locked_line
@@ -103,7 +103,7 @@ def _plant(hertz: np.ndarray, above: tuple[Series, ...], below: tuple[Series, ..
 
 
 def _free_plant(experiments: Experiments) -> dict[str, Figure]:
-    """Draw the measured plant with its joint free, with the line of the mass fitted to it."""
+    """Draw the measured plant with its joint free, with the fitted line of its mass."""
     plant = experiments.rig_loops.plant
     response = plant.averaged
     hertz = response.frequency

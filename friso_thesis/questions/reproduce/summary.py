@@ -1,4 +1,4 @@
-"""The summary of `friso reproduce` for print: all claims on one sheet."""
+"""Draw the summary of `friso reproduce` for print: all claims on one sheet."""
 
 from __future__ import annotations
 
@@ -24,14 +24,17 @@ _BETWEEN = 0.6
 
 
 def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
-    """Write the sheet. Raises OSError."""
+    """Write the summary sheet to a file. Raises OSError."""
     metadata = {"CreationDate": None, "Creator": None, "Producer": None}
     summary_sheet(verdicts, conclusion, colours).savefig(path, format="pdf", metadata=metadata)
 
 
 def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str]) -> Figure:
-    """Every claim, its whole text, with the word of agreement, criteria met, and the draws in which it holds; rows are
-    as high as their texts need."""
+    """Draw every claim with its whole text on one sheet.
+
+    A row has the word of agreement, the criteria met, and the draws in which the claim holds. Rows are as high as their
+    texts need.
+    """
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.figure import Figure
 

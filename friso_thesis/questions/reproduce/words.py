@@ -1,5 +1,7 @@
-"""Write the words of `friso reproduce` on a claim: the finding, and how far it agrees,
-in short and in full."""
+"""Write the words of `friso reproduce` on a claim: the finding, and how far it agrees.
+
+Each comes in short and in full.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis.plausible import Plausible
 
 SHORT = 160
-"""Longest short form of a number, in letters."""
+"""Longest short form of a finding, in letters."""
 
 AGREEMENT = {
     "holds": "agrees",
@@ -38,15 +40,14 @@ def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
 
 
 def short(text: str) -> str:
-    """Return the first statements of a number, as many as stand within `SHORT` characters,
-    but one at least."""
+    """Return the first statements of a text that fit into `SHORT` characters, at least one."""
     first = text.split(". Assumed", 1)[0]
     ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
     return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
 
 
 def numbers(verdict: ClaimVerdict) -> str:
-    """Return the numbers of all parts in one line; empty for a claim that is not covered."""
+    """Return the numbers of all parts in one line; "" for a claim that is not covered."""
     return "; ".join(part.number for part in verdict.finding.stated) if verdict.finding else ""
 
 
@@ -70,7 +71,7 @@ def share(verdict: ClaimVerdict) -> str:
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
     """Say in how many draws one of several criteria is met.
 
-    It is empty for a claim with one criterion, whose fraction is stated with the claim.
+    The text is empty for a claim with one criterion, whose fraction is stated with the claim.
     """
     space = verdict.space
     if space is None or len(space.parts) < 2:
@@ -79,18 +80,20 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return the word of agreement by what attracts the stages; "" where that does not enter."""
+    """Return the word of agreement by what attracts the stages; "" if that does not matter."""
     return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
 
 
 def criterion_word(part: Part) -> str:
-    """Return how a criterion agrees."""
+    """Return the word that says how far a criterion agrees."""
     return "undecided" if part.undecided else "agrees" if part.holds else "does not agree"
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
-    """Return why it does not hold, the first sentence of each reason,
-    of several criteria with those to which it belongs; the rest is among the details."""
+    """Return why a claim does not hold: the first sentence of each reason.
+
+    For several criteria, each reason names the criteria to which it belongs. The rest is among the details.
+    """
     parts = verdict.finding.stated if verdict.finding else ()
     places: dict[str, list[str]] = {}
     for place, part in enumerate(parts, 1):
@@ -113,8 +116,10 @@ def _first_sentence(text: str) -> str:
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """Return what stands below an item, by its name:
-    numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance changes.
+    """Return the texts below an item, by name.
+
+    They are numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance
+    changes.
     """
     parts = verdict.finding.stated if verdict.finding else ()
     rows = [
@@ -133,7 +138,7 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
 
 
 def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
-    """Return the parts by which friso only tests itself, with the claim they stand at."""
+    """Return the parts by which friso only tests itself, with the claim to which they belong."""
     return [
         (verdict.claim.id, part)
         for verdict in verdicts
@@ -144,8 +149,10 @@ def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
 
 
 def open_rows() -> list[Sequence[str]]:
-    """Return the values that the thesis leaves open: range, how it is drawn, friso's own,
-    and the reason."""
+    """Return the values that the thesis leaves open.
+
+    Each row has the range, the distribution of draws, friso's own choice, and the reason.
+    """
     drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
     return [
         (
@@ -160,8 +167,10 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Return which draw, or friso's own choice, fits the printed numbers best,
-    and which numbers these are."""
+    """Say which draw, or friso's own choice, fits the printed numbers best.
+
+    Also say which numbers these are.
+    """
     fit = plausible.fit
     if fit is None:
         return ""
@@ -182,7 +191,7 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """Return the printed numbers, beside those of the best draw."""
+    """Return rows of the printed numbers beside the numbers of the best draw."""
     if plausible.fit is None:
         return []
     return [

@@ -1,1 +1,1 @@
-"""How outcomes of the thesis's own experiments are shown, a module each."""
+"""Show outcomes of the thesis's own experiments, one module each."""

@@ -1,4 +1,4 @@
-"""What `friso rig in-position` shows: Fig. 28 of the thesis, what each disturbance adds, and what damping recovers."""
+"""Show `friso rig in-position`: Fig. 28 of the thesis, and what each disturbance and damping does."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from friso_thesis.studies.rig.in_position import BITS, CASES, SETTLING, SOURCES,
 
 COLOURS = {"locked": VERMILLION, "free": BLUE}
 PARTS = (GREEN, ORANGE, GREY)
-"""Colours of the single disturbances."""
+"""Colours of the single disturbances, in order."""
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Return how still it stands, what moves it, and what damping does."""
+    """Say how still the stage stands, what moves it, and what damping does."""
     result: InPosition = outcome.result
     locked, free = (result.runs[case, "all"].true[0] for case in CASES)
     floor = "the floor of the stage file" if result.own_floor else "a quiet laboratory's floor (assumed)"
@@ -105,8 +105,10 @@ def _spectra(result: InPosition) -> Figure:
 
 
 def _over_damping(result: InPosition) -> Figure:
-    """Draw the position error over the damping of the joint,
-    with the values of the locked and the free joint."""
+    """Draw the position error over the damping of the joint.
+
+    The values of the locked and the free joint are shown for comparison.
+    """
     free = Series(result.damping, result.damped.true[:, 0], "joint free", BLUE)
     limits = (
         Limit((float(result.runs["locked", "all"].true[0, 0]),), "joint locked", VERMILLION),
@@ -122,7 +124,7 @@ def _over_damping(result: InPosition) -> Figure:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """Return all results."""
+    """Return all results for the JSON document."""
     result: InPosition = outcome.result
     return {
         "crossover_hz": result.crossover,

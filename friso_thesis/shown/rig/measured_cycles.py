@@ -1,4 +1,4 @@
-"""What `friso rig measured-cycles` shows: Fig. 27 of the thesis, and what makes simulated cycles as slow as those."""
+"""Show `friso rig measured-cycles`: Fig. 27 of the thesis, and what slows simulated cycles down to it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ ASYMMETRY = "Difference of friction between the two sides"
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Return the even rail's cycle, what rails that vary make of it,
-    and what else makes it as slow."""
+    """Say how the cycle on an even rail looks, what varied rails do to it, and what else slows it down."""
     result: CycleComparison = outcome.result
     even = result.even
     if not even.swings[0]:
@@ -51,7 +50,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _field(result: CycleComparison) -> str:
-    """Say how many rails with a random field give cycles as slow as those measured."""
+    """Say how many rails with a random field give cycles as slow as the measured ones."""
     as_slow, done = result.as_measured(result.field), int((~result.field.failed).sum())
     swings = int(result.field.swings.sum())
     slowest = np.nanmax(result.slower(result.field)) if swings else np.nan
@@ -63,7 +62,7 @@ def _field(result: CycleComparison) -> str:
 
 
 def _asymmetry(result: CycleComparison) -> str:
-    """Return what ends hunting on rails that vary."""
+    """Say what ends hunting on rails that vary."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], result.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
     parts = [
@@ -92,7 +91,7 @@ def _rolling(result: CycleComparison) -> str:
 
 
 def _irregular(result: CycleComparison) -> str:
-    """Return how the cycles of varied rails are irregular."""
+    """Say how the cycles on varied rails are irregular."""
     swings = result.field.swings & np.isfinite(result.field.rising)
     if not swings.any():
         return "No cycle on a varied rail lasts long enough to show how regular it is."
@@ -111,7 +110,7 @@ def _irregular(result: CycleComparison) -> str:
 
 
 def _levels(result: CycleComparison) -> str:
-    """Tell whether other friction levels make the cycle as slow."""
+    """Say whether other friction levels make the cycle as slow."""
     slow, swing = result.slower(result.levels), result.larger(result.levels)
     matches = np.argwhere(result.as_measured(result.levels))
     if not len(matches):
@@ -195,7 +194,7 @@ def _maps(result: CycleComparison) -> Figure:
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
-    """Return medians over the last axis, ignoring NaN; NaN where all are."""
+    """Return medians over the last axis, ignoring NaN; NaN where all values are NaN."""
     defined = np.asarray(np.isfinite(values).any(axis=-1))
     return np.where(defined, np.nanmedian(np.where(defined[..., None], values, 0.0), axis=-1), np.nan)
 

@@ -1,4 +1,4 @@
-"""What `friso rig stroke-crossover` shows: Fig. 26 of the thesis, in each cell the fraction of rails with peaks."""
+"""Show `friso rig stroke-crossover`: Fig. 26 of the thesis, the fraction of rails with peaks in each cell."""
 
 from __future__ import annotations
 
@@ -40,8 +40,7 @@ def _limit(counts: StrokeCrossover, row: int) -> str:
 
 
 def _needed(counts: StrokeCrossover) -> list[str]:
-    """Return the crossover limits by stroke, and from which stroke on none are counted at the
-    stage's own crossover."""
+    """Say where peaks end: the crossover limits by stroke, and the stroke at the stage's own crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
     rows = np.flatnonzero(counts.share[:, counts.nearest] > 0)
@@ -55,7 +54,7 @@ def _needed(counts: StrokeCrossover) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Return the map."""
+    """Draw the map of the experiment."""
     counts: StrokeCrossover = outcome.result
     finite = np.isfinite(counts.limits) & (counts.limits > 0)
     border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
@@ -76,8 +75,10 @@ def rails_panel(counts: StrokeCrossover) -> Panel:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """Return all results; arrays have the shape (strokes, crossovers, rails), shares (strokes,
-    crossovers)."""
+    """Return all results for the JSON document.
+
+    Arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers).
+    """
     counts: StrokeCrossover = outcome.result
     shares = [
         [share_document(counts.runs.share((row, column))) for column in range(len(counts.crossovers))]

@@ -1,5 +1,4 @@
-"""Derive the design guideline: dimensionless groups that govern hunting,
-and laws of its edge.
+"""Derive the design guideline: dimensionless groups that govern hunting, and laws of its edge.
 
 The edge is swept over the groups. Laws are fitted to it, and their errors are taken from samples that were not used for
 the fit.

@@ -1,4 +1,7 @@
-"""Long simulations of samples below and above their edge: do all runs come to rest there, however they begin?"""
+"""Simulate samples for long below and above their edge of hunting.
+
+The question is whether all runs come to rest there, however they begin.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +23,11 @@ MOVES = 16
 """Number of moves tried for each sample."""
 
 SIZES, TIMES = (3.0, 300.0), (0.3, 3.0)
-"""Ranges of the moves.
-
-The first is a t_acc^2 relative to the deflection by the break-away force; the second is t_acc times omega_c. The
-thesis's move has 90 and 1.5 at 8 Hz."""
+"""Ranges of the moves. The first is a t_acc^2 relative to the deflection by the break-away force; the second is t_acc
+times omega_c. The thesis's move has 90 and 1.5 at 8 Hz."""
 
 PERIODS = {BELOW: 200.0, ABOVE: 2000.0}
-"""Length of the check simulations in periods.
-
-Above the edge, transients of up to a thousand periods were seen."""
+"""Length of the check simulations in periods. Above the edge, transients of up to a thousand periods were seen."""
 
 APART = 20.0
 """Time between the move there and the move back, in periods of the crossover."""
@@ -38,9 +37,8 @@ APART = 20.0
 class SimulationCheck:
     """Check of the law by simulation.
 
-    It counts how many of the `samples` still swing at the end, from some of the distances and after some of the moves.
-    They are simulated at 0.9 and at 1.15 times their edge. There are `runs` in all, of which `failed` were not
-    completed.
+    The fields count how many of the `samples` still swing at the end, started from some distances and after some moves,
+    at 0.9 and at 1.15 times their edge. There are `runs` in all, of which `failed` were not completed.
     """
 
     samples: int
@@ -53,7 +51,10 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """Return the first `most` samples that have an edge, which are random ones, simulated."""
+    """Simulate the first samples that have an edge, at most `most`.
+
+    The samples are in random order.
+    """
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))
     runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
@@ -66,8 +67,10 @@ _Begins = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
 def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs of each sample still swing at the end, and which were completed,
-    shape (samples, tried)."""
+    """Return which runs of each sample still swing at the end, and which were completed.
+
+    Both have the shape (samples, tried).
+    """
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)
     values = {name: value[which] for name, value in sweep.values.items()} | {"crossover": share * sweep.edge[which]}

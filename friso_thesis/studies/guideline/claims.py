@@ -18,7 +18,8 @@ from friso_thesis.studies.thesis.reading import OWN, about
 HOLDS, IN_PART, DIFFERS, UNKNOWN = "holds", "holds in part", "differs", "unknown"
 
 FREE_EDGE, LOCKED_EDGES = (5.0, 5.5), (15.0, 14.3)
-"""Crossovers [Hz] above which the thesis's rig no longer hunts, free and locked."""
+"""Crossovers [Hz] above which the thesis's rig no longer hunts: two values with the joint free, and two with it
+locked."""
 
 NEAR = 1.1
 """Ratio within which the free edge may miss its range, and a short stroke's edge may exceed a long one's."""
@@ -40,8 +41,8 @@ SAME = 0.02
 class GuidelineClaim:
     """A claim of the thesis about the edge of hunting.
 
-    It has the claim's words and place, the finding, and whether the claim holds by the rule given. This is unknown if
-    the edge is; the finding then gives the reason.
+    It has the claim's words and place, the finding, and whether the claim `holds` by the rule given. This is None if
+    the edge is unknown; the finding then gives the reason.
     """
 
     where: str
@@ -52,8 +53,10 @@ class GuidelineClaim:
 
 
 def judged_claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
-    """Return the claims of the thesis that the edge decides, judged by computed edges,
-    not by the laws."""
+    """Judge the claims of the thesis that the edge decides.
+
+    Computed edges decide, not the laws.
+    """
     return _gap(worked), _share_below_limit(worked), _mass(worked), _stiffness(worked), _stroke(worked), _edges(worked)
 
 
@@ -157,7 +160,7 @@ def _edges(worked: Worked) -> GuidelineClaim:
 
 
 def _verdict(holds: bool, *edges: float) -> bool | None:
-    """Tell whether something holds of edges; None if one of them is not known."""
+    """Tell whether something holds of edges; None if one of the edges is unknown."""
     return None if np.isnan(edges).any() else bool(holds)
 
 
@@ -184,7 +187,7 @@ def _hertz(edge: float) -> str:
 
 @dataclass(frozen=True)
 class LeastGap:
-    """The least friction gap [N] with which a stage hunts: it lies between `low` and `high`.
+    """Least friction gap [N] with which a stage hunts, between `low` and `high`.
 
     NaN stands for an unknown edge.
     """
@@ -201,17 +204,16 @@ class LeastGap:
         return f"{self.low:.2g} N" if np.isfinite(self.high) else f"more than {self.low:.2g} N, the largest tried,"
 
     def within(self, least: float, most: float) -> bool | None:
-        """Tell whether it lies in a range; None if that is not known."""
+        """Tell whether the gap lies in a range; None if that is unknown."""
         if self.high < least or self.low > most:
             return False
         return True if least <= self.low and self.high <= most else None
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """Return the smallest friction gap F_s - F_c with which the rig, at a static friction [N],
-    hunts at `CLAIMED_AT`.
+    """Return the smallest friction gap F_s - F_c with which the rig hunts at `CLAIMED_AT`.
 
-    It is interpolated linearly between the points of its edge, in logarithms.
+    It is given for a static friction [N], and interpolated linearly between the points of the edge, in logarithms.
     """
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)

@@ -1,4 +1,7 @@
-"""The guideline as data: sweeps, laws fitted to one half of them, their errors on the other, and the worked steps."""
+"""Compute the guideline: sweeps, laws, their errors, and the worked steps.
+
+The laws are fitted to some samples, and their errors are taken from other samples.
+"""
 
 from __future__ import annotations
 
@@ -39,17 +42,15 @@ from friso_thesis.studies.guideline.worked import Worked, friction_range, worked
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 SAMPLES = 512
-"""Default number of samples for the fit of the locked law; the other sweeps are fractions of it."""
+"""Default number of samples for the fit of the locked law. The other sweeps have fractions of it."""
 
 FEWEST, MOST = 64, 65536
-"""Smallest and largest number of samples.
-
-Fewer do not determine the exponents of a law; more bring no gain with Sobol points."""
+"""Smallest and largest number of samples. Fewer do not determine the exponents of a law; more bring no gain with Sobol
+points."""
 
 FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
-"""Ratios of sample numbers: free joint to rigid mass, and test to fit.
-
-The edge of a rigid mass takes a tenth of the work."""
+"""Ratios of sample numbers: free joint to rigid mass, and test to fit. The edge of a rigid mass takes a tenth of the
+work."""
 
 CHECKED = 1 / 8
 """Ratio of simulated samples to samples of the locked fit."""
@@ -63,8 +64,8 @@ class Fit:
     """A law, the samples behind it, and its errors.
 
     The law has samples that it was fitted to and samples that it was tested on, with errors on both. With a free joint,
-    the locked edge is the computed one in `on_fit`, and that of the locked law in `on_test`. `on_computed_edge` has the
-    errors of the test with the computed one. `checked` holds simulations of samples of the test.
+    the locked edge is computed for `on_fit`, and comes from the locked law for `on_test`. `on_computed_edge` has the
+    errors of the test with the computed locked edge. `checked` holds simulations of test samples.
     """
 
     law: FittedLaw
@@ -82,22 +83,22 @@ class Fit:
 
     @property
     def kinds(self) -> Mapping[str, int]:
-        """Return how many samples of fit and test have an edge of which kind,
-        or none for which reason."""
+        """Return how many samples of fit and test have each kind of edge, or each reason for having none."""
         return Counter(self.sweep.edges.kind.astype(str))
 
     @property
     def again(self) -> int:
-        """Return the number of samples in which a cycle attracts again above a crossover without attractor."""
+        """Return the number of samples that hunt again above a crossover without attractor."""
         return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
 @dataclass(frozen=True)
 class Guideline:
-    """Everything in `docs/evidence/guideline.md`.
+    """All results of the guideline, as in `docs/evidence/guideline.md`.
 
-    The number of groups by part of the stage, both laws, the worked steps, what a parasitic mode allows; how long it
-    took [s] on how many cores, and how many parts of the sweeps an earlier, interrupted run had left.
+    They are the number of groups by part of the stage, both laws, the worked steps, and what a parasitic mode allows.
+    Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps came from an
+    interrupted run.
     """
 
     samples: int
@@ -128,7 +129,7 @@ class Guideline:
 
 @dataclass(frozen=True)
 class ByRates:
-    """Errors of the locked law on held-out samples within one range of slip over drop.
+    """Errors of the locked law on held-out samples within a range of slip rate over drop rate.
 
     The ratio is at least `low` and below `high`. The errors are None without samples.
     """
@@ -151,8 +152,10 @@ def by_rates(locked: Fit) -> list[ByRates]:
 
 
 def safe_over_friction(locked: Fit) -> float:
-    """Return the largest of the safe factors of those bins of slip over drop that the rig visits
-    over its friction range."""
+    """Return the safe factor on the locked law for the rig: the largest over its friction range.
+
+    Each bin of slip rate over drop rate has its own factor; bins that the rig does not visit do not count.
+    """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
     visited = _ratio(locked.law, {name: np.array([group[name] for group in groups], float) for name in groups[0]})
@@ -166,10 +169,10 @@ def _ratio(law: FittedLaw, values: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress = silent) -> Guideline:
-    """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on;
-    `progress` gets what is done.
+    """Compute the guideline.
 
-    Raises InputError for a number of samples that does not do.
+    `keep` is a folder for finished parts, from which an interrupted run goes on. `progress` is called as work is done.
+    Raises InputError for an unusable number of samples.
     """
     checked_samples(samples)
     begin = time.perf_counter()
@@ -205,7 +208,7 @@ def checked_samples(samples: int) -> None:
 
 
 def group_counts() -> dict[str, Count]:
-    """Return the numbers of parameters and groups for the rigid rig, with joint, and with parasitic mode."""
+    """Return the numbers of parameters and groups: for the rigid rig, with joint, and with parasitic mode."""
     return {
         "rigid": group_count(plain_rig()),
         "joint": group_count(plain_rig("joint")),
@@ -217,15 +220,17 @@ def _sizes(samples: int) -> dict[str, int]:
     free = int(samples * FREE_SHARE)
     return {
         "locked fit": samples,
-        "locked test": samples // 4,  # the samples with a free joint, locked, are more of them
+        "locked test": samples // 4,  # samples with a free joint give more samples of the locked law
         "free fit": free,
         "free test": int(free * TEST_SHARE),
     }
 
 
 def _steps(sizes: Mapping[str, int]) -> int:
-    """Return the steps of all sweeps; a sample with a free joint is computed with the joint
-    locked, too."""
+    """Return the number of progress steps of all sweeps.
+
+    A sample with a free joint is also computed with the joint locked.
+    """
     both = sum(STEPS.values())
     return sum(size * (both if name.startswith("free") else STEPS[LOCKED]) for name, size in sizes.items())
 

@@ -1,8 +1,8 @@
-"""The edge of the symmetric cycle of many stages: the lowest crossover at and above which it is not known to attract.
+"""Find the edges of the symmetric cycle of many stages.
 
-What else may attract beyond, such as an asymmetric cycle, is looked for after a jump and where no orbit could be
-closed, and nowhere else; `friso.hunting.margin` and `friso.design_method.edges` rest on a survey of everything that
-attracts.
+An edge is the lowest crossover from which on the cycle is not known to attract. Other attractors above it, such as an
+asymmetric cycle, are looked for only after a jump and where no orbit could be closed. `friso.hunting.margin` and
+`friso.design_method.edges`, by contrast, survey all attractors.
 """
 
 from __future__ import annotations
@@ -19,25 +19,21 @@ OF = (
     "the symmetric cycle (of stages that are not symmetric, that over a whole period); others may attract beyond, and "
     "friso check looks for them"
 )
-"""Description of the cycle to which these edges belong."""
+"""Description of the cycle whose edges these are."""
 
 ROUNDS = 6
 """Number of bisections of the grid step that contains the edge."""
 
 MEETS = 0.9, 1.1
-"""Bounds of the multiplier's size below and above a flip.
-
-A multiplier beyond its bound belongs to another cycle. The final bracket of an edge is less than 1 % wide."""
+"""Bounds of the multiplier's size below and above a flip. A multiplier beyond its bound belongs to another cycle. The
+final bracket of an edge is less than 1 % wide."""
 
 STEP, STEPS = 1.02, 16
-"""Factor and largest number of upward steps in crossover after another cycle takes over.
-
-The steps continue while simulations hunt, at most to the next crossover of the grid."""
+"""Factor and largest number of upward steps in crossover, if another cycle has taken over above an edge. The steps
+continue while simulations hunt, at most to the next crossover of the grid."""
 
 LONG = 2000.0
-"""Length of simulations of small cycles, in their periods.
-
-Transients near an unstable cycle may be long."""
+"""Length of simulations of small cycles, in periods of these cycles. Transients near an unstable cycle may be long."""
 
 FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
 BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
@@ -51,7 +47,7 @@ KINDS = {
     ABOVE: "a cycle attracts up to the highest crossover tried",
     UNKNOWN: "a decisive simulation failed, or after a jump hunting did not end within the steps allowed",
 }
-"""Kinds of edges in words, and reasons why a stage has none in the range."""
+"""Kinds of edges in words, and reasons why a stage has no edge in the range."""
 
 Stages = Callable[[np.ndarray, np.ndarray], Ensemble]
 """Function that makes stages from their numbers and crossovers, both of shape (count,)."""
@@ -61,9 +57,11 @@ Stages = Callable[[np.ndarray, np.ndarray], Ensemble]
 class Edges:
     """The edge of each stage, all of shape (count,).
 
-    `crossover`, in the unit of the grid (NaN without an edge); its `kind`, one of `KINDS`; the multiplier `inside`,
-    next below it, where something attracts (NaN: by simulation alone), and `outside`, above it (NaN where no cycle is
-    known); and the number of `windows` of the grid in which something attracts: of several the highest counts.
+    - `crossover`: in the unit of the grid (NaN without an edge).
+    - `kind`: one of `KINDS`.
+    - `inside`: multiplier just below the edge, where a cycle attracts (NaN: only a simulation shows it).
+    - `outside`: multiplier just above (NaN: no known cycle).
+    - `windows`: number of windows of the grid with an attractor; the edge belongs to the highest.
     """
 
     crossover: np.ndarray
@@ -87,8 +85,8 @@ def concatenate_edges(parts: list[Edges]) -> Edges:
 class _AtCrossovers:
     """Results at crossovers.
 
-    They are whether something attracts, and the multiplier (NaN: no cycle). Further, a cycle may exist that could not
-    be closed, and a simulation that then had to decide may have failed.
+    They tell whether something attracts, and give the multiplier (NaN: no cycle). They also tell whether a cycle may
+    exist that could not be closed, and whether a simulation that had to decide then failed.
     """
 
     attracts: np.ndarray
@@ -118,9 +116,9 @@ def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> 
 def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     """Find the edges of stages on a grid of crossovers, shape (count, points), ascending.
 
-    The step behind the last crossover at which a cycle attracts is halved `rounds` times. The search goes on upward if
-    another cycle takes over that still hunts. A flip is interpolated between the multipliers on both sides, if it lies
-    within the remaining step. Otherwise the logarithmic middle of the step is taken.
+    The step above the last crossover at which a cycle attracts is halved `rounds` times. If another cycle takes over
+    that still hunts, the search goes on upward. A flip is interpolated between the multipliers on both sides, if it
+    lies within the remaining step. Otherwise the logarithmic middle of the step is taken.
     """
     count, points = grid.shape
     at_crossovers = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
@@ -142,12 +140,14 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
 
 
 class _Search:
-    """Steps that hold an edge on their way to being halved; all arrays of shape (stages,).
+    """Steps in crossover that contain an edge and are being halved; arrays of shape (stages,).
 
-    `low`, the logarithm of a crossover at which a cycle attracts, with its multiplier; `high`, one at which none is
-    known to, and whether that is because no orbit could be closed; `flip`, the lowest known one at which the cycle
-    repels (inf: none), with its multiplier, which tells of the edge where orbits just above it cannot be closed; and
-    whether a simulation above failed.
+    - `low`: logarithm of a crossover at which a cycle attracts; `inside`: its multiplier.
+    - `high`: logarithm of a crossover at which no cycle is known to attract; `outside`: multiplier there; `unsure`: an
+      orbit there could not be closed.
+    - `flip`: lowest known crossover at which the cycle is unstable (inf: none); `flipped`: its multiplier, which helps
+      to locate the edge if orbits just above it cannot be closed.
+    - `failed`: a simulation above failed.
     """
 
     def __init__(
@@ -191,8 +191,7 @@ class _Search:
 
     @property
     def jumps(self) -> np.ndarray:
-        """Return where a repelling cycle is known just above,
-        but not that which attracts just below."""
+        """Return where the unstable cycle just above is not the cycle that attracts just below."""
         meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
         return np.isfinite(self.outside) & ~meets
 
@@ -212,7 +211,7 @@ class _Search:
         self.failed[jumping] = True
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the edges by the steps, under the names of `Edges`."""
+        """Return the edges that the steps contain, under the names of `Edges`."""
         excess = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
         crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
         within = (self.low <= crossed) & (crossed <= self.high)

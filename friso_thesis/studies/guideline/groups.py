@@ -1,8 +1,8 @@
-"""The dimensionless groups that govern hunting, from the quantities in the declared equations (Buckingham's theorem).
+"""Define the dimensionless groups that govern hunting (Buckingham's theorem).
 
-Which parameters there are is read off the equations of a structure, their dimensions off the units of the stage file's
-keys. n parameters whose dimensions have the rank r make n - r groups; those listed here are as many, without dimension
-and independent, which `tests/thesis/test_guideline.py` checks.
+Parameters are read off the equations of a structure, and their dimensions off the units of the stage file's keys. n
+parameters whose dimensions have the rank r make n - r groups. `tests/thesis/test_guideline.py` checks that the groups
+listed here have that number, and are dimensionless and independent.
 """
 
 from __future__ import annotations
@@ -22,23 +22,21 @@ from friso.quantities import Quantity
 from friso.stage import numeric_keys
 
 LIMITER_OVER_BRISTLES = 200.0
-"""Ratio of limiter to bristle stiffness of the thesis rig (2e7 to 1e5 N/m, Table 2).
-
-It is so large that its value hardly matters."""
+"""Ratio of limiter to bristle stiffness of the thesis rig (2e7 to 1e5 N/m, Table 2). It is so large that its value
+hardly matters."""
 
 
 EXPONENT = 2.0
-"""Stribeck exponent of all sweeps, which is a group by itself: that of the thesis (Table 2)."""
+"""Stribeck exponent of all sweeps, from the thesis (Table 2). The exponent is a group by itself."""
 
 RIGID_SHARE = 0.3
-"""Fraction of a rigid mass that is declared as the stage.
-
-It has no effect: the equations contain the sum only."""
+"""Fraction of a rigid mass that is declared as the stage. It has no effect, because the equations contain the sum
+only."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical parameter: how it is written, the stage-file keys (of one unit) that it is made of, and how."""
+    """A physical parameter: its symbol, the stage-file keys (of one unit) that make it, and how they do."""
 
     written: str
     keys: tuple[str, ...]
@@ -71,8 +69,10 @@ PARAMETERS: Mapping[str, Parameter] = {
 
 @dataclass(frozen=True)
 class Group:
-    """A dimensionless group: `factor` times the parameters to their `powers`; what it means; and of which part of the
-    stage it belongs to ("stage", "joint" or "parasitic")."""
+    """A dimensionless group: `factor` times the parameters to their `powers`.
+
+    It has a meaning in words, and the part of the stage to which it belongs ("stage", "joint" or "parasitic").
+    """
 
     written: str
     meaning: str
@@ -81,7 +81,7 @@ class Group:
     part: str = "stage"
 
     def of(self, flat: Mapping[str, Any]) -> Any:
-        """Return the value of a stage given by flat keys to SI numbers or arrays."""
+        """Return the group's value for a stage given by flat keys to SI numbers or arrays."""
         value = self.factor
         for name, power in self.powers.items():
             parameter = PARAMETERS[name]
@@ -152,7 +152,7 @@ GROUPS: Mapping[str, Group] = {
 }
 
 _TELLING = {"joint": "joint.stiffness", "parasitic": "parasitic.frequency"}
-"""Key that shows, for each part of the stage, that the part exists."""
+"""Key whose presence shows that a stage has a part, by the part."""
 
 GroupValues = Mapping[str, Any]
 """Values of groups by name: numbers, or arrays of one shape."""
@@ -160,7 +160,7 @@ GroupValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class GroupScale:
-    """Units that the groups leave open: of mass [kg], of stiffness [N/m] and of force [N]."""
+    """Units that the groups leave open: a mass [kg], a stiffness [N/m] and a force [N]."""
 
     mass: float = 1.0
     stiffness: float = 1.0
@@ -177,7 +177,7 @@ _UNIT = GroupScale()
 
 @dataclass(frozen=True)
 class Count:
-    """Parameters in the equations of a structure, rank of their dimensions, and groups that follow."""
+    """Number of parameters in the equations of a structure, rank of their dimensions, number of groups."""
 
     parameters: int
     rank: int
@@ -188,8 +188,10 @@ class Count:
 
 
 def group_parameters(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the parameters on which the equations of a stage depend, by name;
-    masses that move as one are one."""
+    """Return the parameters on which the equations of a stage depend, by name.
+
+    Masses that move as one count as one.
+    """
     form = structure(flat)
     present = {str(symbol) for symbol in assemble(form).parameters}
     names = [name for name, parameter in PARAMETERS.items() if present.issuperset(parameter.keys)]
@@ -212,17 +214,17 @@ def _powers(unit: str) -> tuple[float, float, float]:
 
 
 def group_count(flat: Mapping[str, Any]) -> Count:
-    """Return how many groups govern stages of the structure of this one."""
+    """Return how many groups govern stages with the structure of the given one."""
     names = group_parameters(flat)
     matrix = np.stack([dimensions(name, flat) for name in names])
     return Count(len(names), int(np.linalg.matrix_rank(matrix)))
 
 
 def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the groups of a stage given by flat keys to SI numbers or arrays,
-    those of the parts that it has.
+    """Return the groups of a stage given by flat keys to SI numbers or arrays.
 
-    Raises InputError for a stage without LuGre friction or without van Dijk's rules.
+    Only groups of the stage's own parts are returned. Raises InputError for a stage without LuGre friction or without
+    van Dijk's rules.
     """
     if flat.get("friction.model") != "lugre" or CROSSOVER not in flat:
         expected = "LuGre friction and a controller by van Dijk's rules, for which the groups are derived"

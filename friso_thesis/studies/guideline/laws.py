@@ -1,7 +1,7 @@
-"""Fit laws of the edge of hunting: a few frequencies, each a product of powers, combined.
+"""Fit laws of the edge of hunting, which combine a few frequencies, each a product of powers.
 
-A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). The powers are chosen
-by cross-validation. Beginning with none, the exponent that lowers the cross-validated loss most is added, until the
+A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Cross-validation
+chooses the exponents. Beginning with none, the exponent that lowers the cross-validated loss most is added, until the
 next one gains too little.
 
 Rigid (or locked): two times add up. At the Stribeck velocity the bristles need F_s/(sigma_0 v_s) to slip. Where
@@ -40,10 +40,8 @@ SCALE = 0.1
 """Error of the logarithm above which the loss grows linearly instead of quadratically."""
 
 FOLDS, GAIN, MOST = 8, 0.02, 8
-"""Settings of the cross-validation.
-
-They are the number of parts, the relative loss that a further exponent has to save, and the largest number of
-exponents."""
+"""Settings of the cross-validation: the number of parts, the relative loss that a further exponent must save, and the
+largest number of exponents."""
 
 SampleValues = Mapping[str, np.ndarray]
 
@@ -52,8 +50,8 @@ SampleValues = Mapping[str, np.ndarray]
 class Rate:
     """A frequency in units of sqrt(sigma_0/m).
 
-    It is a factor times groups to the fixed powers of `base`, times further groups over their references. The exponents
-    of these are fitted, for those `candidates` that turn out to matter.
+    It is a factor times groups to the fixed powers of `base`, times further groups over their references to fitted
+    powers. Powers are fitted only for those `candidates` that turn out to matter.
     """
 
     name: str
@@ -61,15 +59,13 @@ class Rate:
     candidates: tuple[str, ...]
 
     def fixed(self, values: SampleValues) -> np.ndarray:
-        """Return the logarithm of the part that is not fitted, shape (count,)."""
+        """Return the logarithm of the part of the frequency that is not fitted, shape (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
 
 Combine = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
-"""Function that combines rates into an edge.
-
-It takes the logarithms of the rates, shape (rates, count), and of the locked edge, (count,). It returns the logarithm
-of the edge and its derivatives with respect to those of the rates."""
+"""Function that combines rates into an edge. It takes the logarithms of the rates, shape (rates, count), and of the
+locked edge, (count,). It returns the logarithm of the edge and its derivatives by the logarithms of the rates."""
 
 Exponent = tuple[int, str]
 """The number of a rate and a group."""
@@ -77,7 +73,7 @@ Exponent = tuple[int, str]
 
 @dataclass(frozen=True)
 class EdgeLaw:
-    """Rates, and how the edge follows from them."""
+    """A law of the edge before the fit: its rates, and how the edge follows from them."""
 
     rates: tuple[Rate, ...]
     combine: Combine
@@ -89,8 +85,11 @@ class EdgeLaw:
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law with its numbers: the `factors` of the rates and the `exponents` that were chosen, in their order; `path`,
-    the cross-validated loss (rms-like, see `loss`) with none, one, two, ... of them."""
+    """A law with its numbers.
+
+    `factors` belong to the rates, and `exponents` were chosen in this order. `path` is the cross-validated loss (see
+    `loss`) with no exponent, one, two, and so on.
+    """
 
     law: EdgeLaw
     factors: tuple[float, ...]
@@ -107,18 +106,20 @@ class FittedLaw:
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
     def edge(self, values: SampleValues, locked: np.ndarray | None = None) -> np.ndarray:
-        """Return the edge of stages with these groups, in units of sqrt(sigma_0/m);
-        `locked` is that with the joint locked."""
+        """Return the edge of stages with these groups, in units of sqrt(sigma_0/m).
+
+        `locked` is the edge with the joint locked.
+        """
         rates = self.log_rates(values)
         return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a law.
+    """Errors of a law, as errors of the logarithm of the edge over `count` samples.
 
-    For `count` samples, it has the root mean square, the median, the 95 % quantile and the `worst` of the error of the
-    logarithm. The edge over that of the law lies between `least` and `most`.
+    `rms` is the root mean square; `median`, `usual` (95 % quantile) and `worst` are sizes. The ratio of the edge to the
+    law lies between `least` and `most`; `safe` is its 95 % quantile.
     """
 
     count: int
@@ -164,7 +165,7 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
 
 
 def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
-    """Return the law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
+    """Fit a law to edges, shape (count,); cross-validation chooses its exponents."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
     folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS
@@ -184,7 +185,10 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
 
 
 def loss(off: np.ndarray) -> float:
-    """Return the size of errors of the logarithm: their rms if small; beyond `SCALE` they count linearly."""
+    """Return the size of errors of the logarithm: the rms if they are small.
+
+    Errors beyond `SCALE` count linearly.
+    """
     return float(np.sqrt(np.mean(2 * SCALE**2 * (np.sqrt(1 + (off / SCALE) ** 2) - 1))))
 
 
@@ -196,7 +200,7 @@ def _validated(
     offset: np.ndarray,
     folds: np.ndarray,
 ) -> float:
-    """Return the loss on each part of the samples of the law fitted to the others."""
+    """Return the cross-validated loss: on each part of the samples, with the law fitted to the others."""
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold

@@ -1,5 +1,4 @@
-"""Find how far above the crossover the parasitic mode of a joint has to be,
-by linear analysis."""
+"""Find how far above the crossover a joint's parasitic mode has to be, by linear analysis."""
 
 from __future__ import annotations
 
@@ -27,7 +26,7 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 class ParasiticLimits:
     """Range of crossovers that a parasitic mode allows, with the joint locked and free.
 
-    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] surrounds the stage's own crossover, and has a
+    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover, and has a
     modulus margin of at least 0.5 in all settled states; None if the stage lacks this margin at its own crossover.
     """
 
@@ -38,8 +37,10 @@ class ParasiticLimits:
 
 
 def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
-    """Return the stage with each of these modes instead of its own,
-    sampled as the thesis's drive."""
+    """Find the limits for a stage with each of several parasitic modes in place of its own.
+
+    The stage is sampled like the thesis's drive.
+    """
     modes = []
     for damping in DAMPING_RATIOS:
         for frequency in FREQUENCIES:
@@ -51,8 +52,11 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
 
 
 def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of the settled states of a stage with these changes (flat
-    keys to SI numbers), sampled as the thesis's drive; 0 if one of them is not stable."""
+    """Return the least modulus margin of a stage with changes in its settled states.
+
+    Changes are flat keys to SI numbers, and the stage is sampled like the thesis's drive. The margin is 0 if a state is
+    not stable.
+    """
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 
 

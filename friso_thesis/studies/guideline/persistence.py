@@ -1,6 +1,6 @@
-"""Simulate stages for long from many starts to see whether they still swing.
+"""Simulate stages for long from many starts, to see whether they still swing at the end.
 
-This is the evidence of an attractor where no orbit could be closed.
+A swing at the end is evidence of an attractor if no orbit could be closed.
 """
 
 from __future__ import annotations
@@ -19,24 +19,20 @@ from friso.hunting.criteria import lasts
 from friso.hunting.measures import swing_of
 
 DISTANCES = np.geomspace(0.02, 2.0, 95)
-"""Start distances, relative to the loop's deflection by the break-away force, 5 % apart.
-
-Cycles have distances from 0.03, at the smallest friction gaps, to 1.5."""
+"""Start distances, relative to the loop's deflection by the break-away force, 5 % apart. Cycles have distances from
+0.03, at the smallest friction gaps, to 1.5."""
 
 SMALL = 0.005
-"""Band around the reference within which a motion counts as resting, in units of the same deflection.
-
-The smallest cycles of the sweeps swing by at least 0.06 from peak to peak."""
+"""Band around the reference within which a motion counts as resting, relative to the loop's deflection by the
+break-away force. The smallest cycles of the sweeps swing by at least 0.06 from peak to peak."""
 
 SLOW = 0.05
-"""Distance whose cycle sets the length of simulations, in units of the deflection by the break-away force.
-
-Small cycles have the longest periods, because a stage sticks longer near its reference."""
+"""Distance whose cycle sets the length of simulations, relative to the deflection by the break-away force. Small cycles
+have the longest periods, because a stage sticks longer near its reference."""
 
 PERIODS, LAST = 200.0, 2.0
-"""Default length of simulations, and length of the judged end, in periods of the cycle at `SLOW`.
-
-Near a cycle that repels by 1 % per half period, a deviation grows 50 times within the first."""
+"""Default length of simulations, and length of the end that is judged, in periods of the cycle at `SLOW`. Near a cycle
+that repels by 1 % per half period, a deviation grows 50 times within the first."""
 
 RTOL = 1e-6
 """Relative tolerance of the simulations."""
@@ -44,7 +40,10 @@ RTOL = 1e-6
 
 @dataclass(frozen=True)
 class Begin:
-    """Keys of a motion, states at the start, (count, states) (None: at rest), and when the motion is over [s]."""
+    """Start of runs: keys of a motion, initial states, and when the motion is over [s].
+
+    States have the shape (count, states); None stands for rest.
+    """
 
     motion: Mapping[str, Any]
     starts: np.ndarray | None = None
@@ -52,14 +51,13 @@ class Begin:
 
 
 def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
-    """Return a start at rest, stuck at distances (count,) in units of the deflection by the break-away force."""
+    """Return a start at rest, stuck at distances (count,) relative to the break-away deflection."""
     return Begin({"motion.displacement": stages.length}, stuck(stages, distances * stages.length))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
-    """Return which stages still swing at the end, and which runs were completed,
-    both of shape (count,)."""
+    """Return which stages still swing at the end, and which runs were completed, both (count,)."""
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = RunOptions(
@@ -82,8 +80,10 @@ def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tu
 def swings_from_any_distance(
     stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which stages swing for ever from any of the distances, and of which that is known,
-    both of shape (count,): a stage of which a run failed, while no other swings on, may swing or not."""
+    """Return which stages swing for ever from any of the distances, and for which this is known.
+
+    Both have the shape (count,). If a run of a stage failed, and no other run keeps swinging, it is unknown.
+    """
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
     swings, completed = (runs_of_stages.reshape(stages.count, -1) for runs_of_stages in runs)

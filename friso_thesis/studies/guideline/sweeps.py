@@ -1,4 +1,7 @@
-"""Sweeps of the edge of hunting over Sobol samples of the groups, in parts that outlive an interruption."""
+"""Sweep the edge of hunting over Sobol samples of the groups.
+
+The sweeps are computed in parts, which are kept if a run is interrupted.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +34,8 @@ LOCKED_BOX: Box = {
     "beta": (1.5, 4.0),
     "tuned_mass": (0.8, 1.25),
 }
-"""Ranges about the thesis rig (gap 0.67, stribeck 0.33, bristle damping 0.38, viscous 6e-4, alpha 0.1, beta 2), as wide
-as masses from 0.5 to 50 kg and bristles from 1e5 to 1e8 N/m make them."""
+"""Ranges around the thesis rig (gap 0.67, stribeck 0.33, bristle damping 0.38, viscous 6e-4, alpha 0.1, beta 2). They
+are as wide as masses from 0.5 to 50 kg and bristles from 1e5 to 1e8 N/m make them."""
 
 JOINT_BOX: Box = {
     "ratio": (0.15, 3.0),
@@ -41,8 +44,8 @@ JOINT_BOX: Box = {
     "stroke": (0.02, 20.0),
     "limiter_damping": (5e-3, 0.3),
 }
-"""Ranges of the joint; `ratio` is its frequency, sqrt(k_j/m), over the locked edge: below the range the joint is far
-softer than any that the thesis tries, above it the isolator changes hardly anything."""
+"""Ranges of the joint. `ratio` is its frequency, sqrt(k_j/m), over the locked edge. Below its range the joint is far
+softer than any that the thesis tries; above it the isolator changes hardly anything."""
 
 LOCKED_GRID = np.geomspace(0.004, 1.0, 20)
 """Crossovers tried, in units of sqrt(sigma_0/m)."""
@@ -59,8 +62,10 @@ LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
 
 @dataclass(frozen=True)
 class Sweep:
-    """Samples and their edges: `values` by group, shape (count,), the crossover among them at the edge (in units of
-    sqrt(sigma_0/m), NaN without an edge); `locked`, the edge of the same stage with its joint locked (rigid), (count,).
+    """Samples and their edges.
+
+    `values` are the groups, each of shape (count,), and contain the crossover at the edge (in units of sqrt(sigma_0/m),
+    NaN without an edge). `locked` (count,) is the edge of the same stage with its joint locked (rigid).
     """
 
     values: Mapping[str, np.ndarray]
@@ -68,7 +73,7 @@ class Sweep:
     edges: Edges
 
     def take(self, which: np.ndarray) -> Sweep:
-        """Return the samples with these numbers, or those for which it is true."""
+        """Select samples by numbers or by a boolean array."""
         values = {name: value[which] for name, value in self.values.items()}
         return Sweep(values, self.locked[which], Edges(*(getattr(self.edges, e.name)[which] for e in fields(Edges))))
 
@@ -97,7 +102,7 @@ class Keep(KeptWork):
     sources = ("../friso_thesis/studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
-        """Return the part with this name: as it was kept, or made now and kept."""
+        """Return the part with this name, from the folder or else computed now and saved."""
         columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
         return Edges(**columns)
 
@@ -114,8 +119,10 @@ def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
-    """Return the edges of samples of rigid masses,
-    which locked joints are apart from the contact of their fixtures."""
+    """Return the edges of samples of rigid masses.
+
+    A locked joint is almost a rigid mass: it differs only by the contact of its fixtures.
+    """
     values = sobol_samples(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
@@ -123,9 +130,10 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 
 
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
-    """Return the edges of samples with a free joint,
-    of those that have one with the joint locked; and those of all samples with their joints locked, to which the
-    frequency of the joint is drawn relative."""
+    """Return the edges of samples with a free joint, and of all samples with their joints locked.
+
+    The first result has only samples with a locked edge, because the frequency of the joint is drawn relative to it.
+    """
     drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))

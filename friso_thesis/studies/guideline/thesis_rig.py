@@ -1,4 +1,4 @@
-"""The worked example: the thesis rig, by the laws and by direct computation side by side."""
+"""Compute the worked example: the thesis rig, by the laws and directly, side by side."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from friso_thesis.studies.thesis.studies import thesis_rig
 
 RIGID_GRID = np.geomspace(2.0, 60.0, 14)
 FREE_GRID = np.geomspace(1.0, 20.0, 28)
-"""Crossovers tried for the rig [Hz]; the more with a free joint, some of whose cycles cannot be closed."""
+"""Crossovers tried for the rig [Hz]. There are more than in the sweeps, because some cycles with a free joint cannot be
+closed."""
 
 RigChanges = Mapping[str, Any]
 """Keys that differ from those of the rig, with SI values."""
@@ -26,8 +27,10 @@ RigChanges = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class ThesisCase:
-    """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
-    its `kind`, one of `KINDS`, which says why there is none."""
+    """A stage like the rig: what is changed, and its edge [Hz] by the law and as computed.
+
+    The computed edge is NaN if none was found; `kind`, one of `KINDS`, then gives the reason.
+    """
 
     changes: RigChanges
     law: float
@@ -36,8 +39,10 @@ class ThesisCase:
 
     @property
     def ranked(self) -> float:
-        """Return the computed edge [Hz] to be compared: 0 if it lies below the crossovers tried,
-        infinite if above, NaN if it is not known."""
+        """Return the computed edge [Hz] for comparisons.
+
+        It is 0 if it lies below the crossovers tried, infinite if above, and NaN if unknown.
+        """
         return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
 
 
@@ -49,13 +54,18 @@ class Laws:
     free: FittedLaw
 
     def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] with the joint locked of stages given by flat keys to SI numbers or
-        arrays."""
+        """Return the edge [Hz] of stages with the joint locked.
+
+        Stages are given by flat keys to SI numbers or arrays.
+        """
         values, rate = _shaped(flat)
         return self.locked.edge(values) * rate
 
     def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] with the joint free, likewise."""
+        """Return the edge [Hz] of stages with the joint free.
+
+        Stages are given by flat keys to SI numbers or arrays.
+        """
         values, rate = _shaped(flat)
         return self.free.edge(values, self.locked.edge(values)) * rate
 
@@ -70,8 +80,7 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return the groups as arrays of one shape,
-    and the frequency [Hz] of the mass on its bristles."""
+    """Return the groups as arrays of one shape, and the frequency [Hz] of the mass on its bristles."""
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
     arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
@@ -79,14 +88,16 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
 
 
 def plain_rig(part: str = "") -> dict[str, Any]:
-    """Return the flat keys of the rig without its parasitic mode;
-    without its joint as well unless part is "joint"."""
+    """Return the flat keys of the rig without its parasitic mode.
+
+    The joint is left out too, unless `part` is "joint".
+    """
     dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
     return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
 
 
 def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
-    """Return the rig with each of these changes, rigid or with its joint free."""
+    """Compute the rig with each of the changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
     keys = {key for change in changes for key in change}
@@ -105,7 +116,6 @@ def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisC
 
 
 def direct(stage: Stage) -> float:
-    """Return the edge [Hz] as `friso check` finds it,
-    from a crossover at which the stage hunts; NaN without one."""
+    """Return the edge [Hz] that `friso check` finds, for a stage that hunts; NaN without an edge."""
     edge = find_margin(stage, attracting=True)
     return edge.crossover if edge and edge.crossover else np.nan

@@ -1,4 +1,7 @@
-"""The worked steps: from the friction range and the crossover limit of a machine to its isolator, on the thesis rig."""
+"""Work through the steps from a machine's friction range and crossover limit to its isolator.
+
+The machine is the thesis rig.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +20,14 @@ from friso_thesis.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCas
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 STATIC = (1.0, 1.5, 2.0, 2.5)
-"""Static friction of the rig [N]: the range that the thesis measured (Fig. 20); Table 2 has 3 N."""
+"""Static friction of the rig [N]: the range that the thesis measured (Fig. 20). Table 2 has 3 N."""
 
 GAPS = (0.15, 0.3, 0.5, 0.7, 0.85)
-"""Friction gaps tried, since dynamic friction could not be measured: the range of the law."""
+"""Friction gaps tried, over the range of the law, because dynamic friction could not be measured."""
 
 LIMITS = (8.0, 48.0)
-"""Bandwidth limits [Hz]: the crossover at which the thesis evaluates its isolator (Sec. 3.4.2), and the highest that
-was stable on its rig (Sec. 4.3.1)."""
+"""Bandwidth limits [Hz]: the crossover at which the thesis evaluates its isolator (Sec. 3.4.2), and the highest stable
+crossover of its rig (Sec. 4.3.1)."""
 
 AMPLE = 1.0
 """Stroke [m] that exceeds every cycle."""
@@ -41,12 +44,12 @@ STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
     "stroke": lambda changes: changes["joint.stroke"],
     "parasitic": lambda changes: changes["parasitic.frequency"],
 }
-"""Functions that return the varied value [SI] of each study, from the changes of a case."""
+"""Functions that return the value [SI] that each study varies, from the changes of a case."""
 
 
 @dataclass(frozen=True)
 class WorkedMachine:
-    """A machine of the rig's kind by its name: its edge [Hz] by the law and as `friso check` finds it."""
+    """A machine like the rig, by its name: its edge [Hz] by the law and as `friso check` finds it."""
 
     name: str
     law: float
@@ -55,9 +58,12 @@ class WorkedMachine:
 
 @dataclass(frozen=True)
 class WorkedDesign:
-    """An isolator for a crossover limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
-    [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; its edges over the friction range, and the
-    least modulus `margin` of the settled states at the limit, with the rig's own friction and parasitic mode."""
+    """An isolator for a crossover limit [Hz].
+
+    `aim` [Hz] is the edge for which the law designs it. It has a stiffness [N/m], the stroke that it needs [m], and the
+    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin of
+    the settled states at the limit, with the rig's own friction and parasitic mode.
+    """
 
     limit: float
     aim: float
@@ -72,7 +78,7 @@ class WorkedDesign:
 
     @property
     def worst(self) -> float:
-        """Return the highest edge that is known [Hz], or the least crossover tried if all lie below."""
+        """Return the highest known edge [Hz], or the least crossover tried if all edges lie below it."""
         return float(np.nanmax([FREE_GRID[0], *(case.ranked for case in self.cases)]))
 
     @property
@@ -82,16 +88,16 @@ class WorkedDesign:
 
     @property
     def does(self) -> bool:
-        """Tell whether no cycle attracts at the limit over the friction range."""
+        """Tell whether the isolator works: no cycle attracts at the limit over the friction range."""
         return self.worst <= self.limit and not self.unknown
 
 
 @dataclass(frozen=True)
 class IsolatorNeed:
-    """Tell whether a machine with a crossover limit [Hz] needs an isolator.
+    """Whether a machine with a crossover limit [Hz] needs an isolator.
 
-    It does if the limit is below `edge` [Hz], the highest locked edge by the law over the friction range, with its
-    safety factor.
+    It does if the limit is below `edge` [Hz], the highest locked edge by the law over the friction range, multiplied by
+    its safety factor.
     """
 
     limit: float
@@ -107,12 +113,12 @@ class Worked:
     """The rig as a worked example of the guideline.
 
     - `rates` [Hz], by name; `machines`, by law and by computation.
-    - Its edge over the `friction` range, rigid.
-    - `bound` [Hz]: highest edge by the law over all friction forces, at the rig's bristles and masses and the gaps
+    - `friction`: edges of the rigid rig over the friction range.
+    - `bound` [Hz]: highest edge by the law over all friction forces, with the rig's bristles and masses and the gaps
       swept.
     - `safe`: factor on the locked law.
     - `needs`: by crossover limit; `designs`: isolators, by the law and then corrected until the computation agrees.
-    - `studies`: of claims of the thesis, by name.
+    - `studies`: studies of claims of the thesis, by name.
     """
 
     rates: Mapping[str, float]
@@ -126,8 +132,10 @@ class Worked:
 
     @property
     def worst(self) -> ThesisCase:
-        """Return the case of the friction range with the highest computed edge,
-        or one of which it is not known."""
+        """Return the case of the friction range with the highest computed edge.
+
+        If an edge is unknown, a case with an unknown edge is returned.
+        """
         return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 
 
@@ -137,8 +145,10 @@ def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
 
 
 def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
-    """Return the worked steps with these laws;
-    crossovers are kept above them by the safety factors."""
+    """Work through the steps with given laws.
+
+    Crossovers are kept above the laws by the safety factors.
+    """
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
     needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
@@ -155,7 +165,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
 
 
 def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
-    """Return the rig as one rigid mass, locked and free."""
+    """Return the machines of the worked example: the rig as one rigid mass, locked and free."""
     flat = plain_rig("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
     stage = thesis_rig()
@@ -173,10 +183,9 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
 
 
 def highest(laws: Laws) -> float:
-    """Return the highest edge [Hz] of the rig by the law,
-    over all friction forces with a gap in the range.
+    """Return the highest edge [Hz] of the rig by the law, over all friction forces.
 
-    Masses and bristles are unchanged: the edge is proportional to sqrt(sigma_0/m).
+    The gap stays in the range. Masses and bristles are unchanged: the edge is proportional to sqrt(sigma_0/m).
     """
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
     flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
@@ -184,9 +193,11 @@ def highest(laws: Laws) -> float:
 
 
 def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
-    """Return the isolator by the law, its edge by a safety factor below the limit; then,
-    as long as computed edges are above the limit, again with the aim lowered by as much, and where one is unknown at
-    least by `BLIND`."""
+    """Design isolators until their computed edges are below the limit.
+
+    The first is designed by the law, with its edge a safety factor below the limit. As long as computed edges are above
+    the limit, another follows with the aim lowered by that ratio, or by `BLIND` or more if an edge is unknown.
+    """
     designs = [_design(laws, limit, limit / safe)]
     while not designs[-1].does and len(designs) < CORRECTED:
         share = min(limit / designs[-1].worst, BLIND if designs[-1].unknown else 1.0)
@@ -195,10 +206,9 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
 
 
 def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
-    """Design a joint with nine tenths of the largest stiffness whose edge by the law stays below
-    the aim.
+    """Design a joint whose edge by the law stays below the aim, over the friction range.
 
-    The edge must stay below it over the friction range. The stroke is the smallest with which it still does.
+    Its stiffness is nine tenths of the largest possible one, and its stroke the smallest possible.
     """
     forces = friction_range(DESIGN_GAPS)
     base: dict[str, Any] = plain_rig("joint")
@@ -220,13 +230,13 @@ DESIGN_GAPS = (0.3, 0.6, 0.85)
 """Friction gaps over which a design is computed."""
 
 CORRECTED, CLOSER = 5, 0.98
-"""Largest number of designs, including that by the law, and safety factor on each new aim."""
+"""Largest number of designs, including the first by the law, and safety factor on each new aim."""
 
 BLIND = 0.85
-"""Factor on the new aim where an edge is unknown."""
+"""Factor on the new aim if an edge is unknown."""
 
 MARGIN = 0.9
-"""Chosen stiffness of the joint relative to the stiffest allowed, which would need an endless stroke."""
+"""Chosen stiffness of the joint over the stiffest allowed, which would need an infinite stroke."""
 
 
 def _root(function: Any, low: float, high: float) -> float:
@@ -234,7 +244,7 @@ def _root(function: Any, low: float, high: float) -> float:
 
 
 def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
-    """Return the changes of the rig by study, and whether its joint is free."""
+    """Return the changes of the rig for each study, and whether its joint is free."""
     flat = plain_rig("joint")
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
     forces = [

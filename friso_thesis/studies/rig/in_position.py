@@ -1,6 +1,6 @@
-"""Standstill with the joint locked and free.
+"""Measure standstill with the joint locked and free (thesis, Fig. 28).
 
-Thesis, Fig. 28: which disturbance moves the stage, and what damping recovers.
+The experiment shows which disturbance moves the stage, and what damping recovers.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ SETTLING, WATCHED = 4.0, 12.0
 """Settling time before the record [s], and length of the record [s]."""
 
 INTERVAL = 5e-4
-"""Largest time between samples [s]."""
+"""Longest time between samples [s]."""
 
 BITS = 14
-"""Resolution of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its
-amplifier."""
+"""Resolution of the drive's force between its limits [bits]: our choice. The noise of the amplifier is taken to be that
+of rounding to uniform steps."""
 
 LIMIT_FACTOR = 60.0
 """Largest force over the static friction, for a drive that states none: that of the thesis's rig, rounded."""
 
 FLOOR = {"frequency": ["1 Hz", "10 Hz", "100 Hz"], "acceleration": [f"{a} m/s^2/Hz^0.5" for a in (1e-5, 1e-4, 1e-4)]}
-"""Acceleration of the floor of a quiet laboratory, where the stage states none: our choice. In thirds of an octave its
+"""Acceleration of the floor of a quiet laboratory, for a stage that states none: our choice. In thirds of an octave its
 velocity stays below 2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vibration criteria."""
 
 DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
@@ -53,8 +53,11 @@ SOURCES = ("encoder", "amplifier", "floor", "all")
 
 @dataclass(frozen=True)
 class Standstill:
-    """Deviation from its mean [m] of runs at a standstill: RMS and largest, `true` and as the encoder `read`s it, each
-    of shape (runs, 2); and the amplitude spectral densities of the true position [m/Hz^0.5], shape (runs, n)."""
+    """Deviation from the mean [m] of runs at a standstill.
+
+    `true` is the true deviation, and `read` the one that the encoder reads, each as RMS and largest value, shape (runs,
+    2). `spectrum` (runs, n) is the amplitude spectral density of the true position [m/Hz^0.5].
+    """
 
     true: np.ndarray
     read: np.ndarray
@@ -64,12 +67,13 @@ class Standstill:
 
 @dataclass(frozen=True)
 class InPosition:
-    """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, each of one run, and the
-    spectra's `frequencies` [Hz]. `damped`: free with all disturbances, by `damping` [N s/m]; `own` is the joint's.
+    """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, one run each.
 
-    `louder` has the largest deviations [m] locked and free by the factor on the force noise. `amplifier` is the RMS
-    [N] of the force noise; `own_floor` says whether the floor is the stage's. `after_move`: by case, with all
-    disturbances, as soon after the move as others after their start.
+    `frequencies` [Hz] belong to the spectra. `damped` has runs with a free joint and all disturbances, by `damping` [N
+    s/m]; `own_damping` is the joint's. `louder` has the largest deviations [m] locked and free, by the factor on the
+    force noise. `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the stage states the floor.
+    `after_move` has, by case, runs with all disturbances after the move, as long after it as other runs after their
+    start.
     """
 
     crossover: float
@@ -85,12 +89,12 @@ class InPosition:
     louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
 
     def ratio(self, source: str) -> float:
-        """Return the RMS with the joint free relative to that with it locked."""
+        """Return the RMS with the joint free over the RMS with it locked."""
         return float(self.runs["free", source].true[0, 0] / self.runs["locked", source].true[0, 0])
 
     @property
     def recovered(self) -> np.ndarray:
-        """Return how much of the difference in RMS between free and locked each damping recovers, as a fraction."""
+        """Return the fraction of the difference in RMS between free and locked that each damping recovers."""
         locked, free = (self.runs[case, "all"].true[0, 0] for case in CASES)
         return (free - self.damped.true[:, 0]) / (free - locked)
 
@@ -109,8 +113,10 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def in_position(
     stage: Stage, seed: int, progress: Progress, noises: tuple[float, ...] = ()
 ) -> tuple[InPosition, dict[str, tuple[RecordedRuns, Stage]]]:
-    """Return all standstills, with all disturbances also at other `noises` of the force,
-    over that assumed; and by case the run with all disturbances and its stage."""
+    """Return all standstills, and by case the run with all disturbances, with its stage.
+
+    With all disturbances, the noise of the force is also multiplied by the factors `noises`.
+    """
     fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
@@ -161,15 +167,17 @@ def in_position(
 
 
 def amplifier_noise(stage: Stage) -> float:
-    """Return the RMS [N] of the drive's force noise: that of rounding to `BITS` between its limits."""
+    """Return the RMS [N] of the drive's force noise, as of rounding to `BITS` between its limits."""
     flat = stage.flat()
     limit = flat.get(FORCE_LIMIT, LIMIT_FACTOR * flat.get("friction.static", 1.0))
     return float(2 * limit / 2**BITS / np.sqrt(12))
 
 
 def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask:
-    """Return the task with a force of an RMS [N], unknown to the drive,
-    that is another at every sample of it, `step` [s]."""
+    """Return the task with a random force added, unknown to the drive.
+
+    The force has an RMS [N], and changes at every sample of the drive, every `step` [s].
+    """
     noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / step)) + 1)
     return replace(task, injected=force * noise, injected_each=step, unknown=True)
 
@@ -192,7 +200,7 @@ def _recorded(
 
 
 def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return time [s] and true deviation from the reference [m] of the first run, from the start of the record."""
+    """Return time [s] and true deviation from the reference [m] of the first run, from the record's start."""
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]
@@ -208,7 +216,10 @@ def _standstill(recorded: RecordedRuns, since: float) -> Standstill:
 
 
 def segment(step: float) -> int:
-    """Return the number of samples per segment of the spectrum, for a sample time [s]; segments overlap by half."""
+    """Return the number of samples per segment of the spectrum, for a sample time [s].
+
+    Segments overlap by half.
+    """
     return 2 * int(WATCHED / step / (SEGMENTS + 1))
 
 

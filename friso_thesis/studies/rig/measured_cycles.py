@@ -1,9 +1,8 @@
-"""Hunting cycles as irregular and as slow as measured: how much friction has to vary for that.
+"""Simulate hunting cycles as irregular and as slow as the measured ones (thesis, Fig. 27).
 
-Thesis, Fig. 27: what friction that varies does to them, and what else.
-
-The thesis gives no numbers for the irregularity; of the period it says that the simulated one is nearly half of the
-measured one, at a similar amplitude.
+The question is how much friction has to vary for that, and what else makes cycles slow. The thesis gives no numbers for
+the irregularity. Of the period it says that the simulated one is nearly half of the measured one, at a similar
+amplitude.
 """
 
 from __future__ import annotations
@@ -53,26 +52,24 @@ STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75,
 """Static and Coulomb friction relative to those of the stage, on an even rail: our choice."""
 
 STARTS = (0.0, 0.005, 0.01, 0.02)
-"""Starts of a cycle: the move (0), or a release from a fraction of its distance."""
+"""Starts of a cycle: the move (0), or a release from a fraction of the move's distance."""
 
 LONGER = 1.5
-"""Length of these runs relative to others, so that slow cycles occur often enough."""
+"""Length of the runs relative to others, so that slow cycles repeat often enough."""
 
 MASS_FACTOR = 1.47
 """Mass read from the mass line relative to the weighed mass (Sec. 4.2.1)."""
 
 MOTORS = (1.0, 1 / MASS_FACTOR)
-"""Motor constants relative to the stage's.
-
-With the weaker one, the weighed mass would show the measured mass line."""
+"""Motor constants relative to the stage's. With the weaker motor, the weighed mass would show the measured mass
+line."""
 
 AS_SLOW, SIMILAR = 1.8, 1.5
-"""Thresholds of periods and swings relative to the even rail.
-
-A period from the first on is "nearly twice"; swings within the second factor are "similar"."""
+"""Thresholds of periods and swings relative to the even rail. A period from the first on is "nearly twice"; swings
+within the second factor are "similar"."""
 
 BINS = (0.0, 0.01, 0.02, 0.03, 0.05, 0.1, np.inf)
-"""Edges of the bins of asymmetry of friction."""
+"""Edges of the bins for the asymmetry of friction."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +78,13 @@ class CycleComparison:
 
     - `even`: on an even rail, one run.
     - `field`: on rails with a random field, shape (deviations, lengths, rails). `asymmetry` is the difference in the
-      logarithm of static friction between the two sides of the target, half the even rail's swing away.
+      logarithm of static friction between the two sides of the target, at half the even rail's swing from it.
     - `rolling`, `rolling_asymmetry`: on rails with a first harmonic, shape (harmonics, rails).
     - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb), for the motor
       that the drive assumes and for the weaker one of `MOTORS`.
-    - `others`: on an even rail, by the other change made. If one start does not lead to a cycle, another was taken.
-    - `traces`: the even rail, and the varied one with the slowest cycle of a similar swing (None: there is none), with
+    - `others`: on an even rail with one other change, by its name. If one start does not lead to a cycle, another was
+      taken.
+    - `traces`: the even rail, and the varied rail with the slowest cycle of a similar swing (None: there is none), with
       its deviation, length [m] and seed.
     """
 
@@ -105,11 +103,11 @@ class CycleComparison:
     slowest: tuple[float, float, float] | None
 
     def slower(self, runs: RailRuns) -> np.ndarray:
-        """Return periods relative to that of the even rail; NaN for runs that do not swing at their end."""
+        """Return periods over that of the even rail; NaN for runs that do not swing at their end."""
         return np.where(runs.swings, runs.period, np.nan) / self.even.period[0]
 
     def larger(self, runs: RailRuns) -> np.ndarray:
-        """Return swings relative to that of the even rail; NaN for runs that do not swing at their end."""
+        """Return swings over that of the even rail; NaN for runs that do not swing at their end."""
         return np.where(runs.swings, runs.swing, np.nan) / self.even.swing[0]
 
     def as_measured(self, runs: RailRuns) -> np.ndarray:
@@ -119,8 +117,11 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the fraction that still swings
-        when the run ends, and the median of the periods over that of the even rail."""
+        """Return, for each bin of asymmetry (`BINS`), how often and how slowly cycles swing.
+
+        All rails with a field count. The first value is the fraction that still swings when the run ends, the second
+        the median of the periods over that of the even rail.
+        """
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):
             inside = (size >= low) & (size < high)
@@ -131,8 +132,10 @@ class CycleComparison:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Return all cycles. Raises InputError without a joint,
-    a crossover or a motion that moves the stage."""
+    """Run all cycles.
+
+    Raises InputError without a joint, a crossover or a motion that moves the stage.
+    """
     locked = with_joint(stage, locked=True)
     crossover(stage)
     result = compare_cycles(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
@@ -154,7 +157,7 @@ def compare_cycles(
     machines: int,
     progress: Progress,
 ) -> CycleComparison:
-    """Return the cycles of a stage with its joint locked, on so many rails of each kind."""
+    """Compare the cycles of a stage with its joint locked, on `machines` rails of each kind."""
     even = on_rail(stage)
     plain = started(even, seed, {}, 1, progress, "an even rail")
     swing = float(plain.swing[0]) if plain.swings[0] else 0.01 * distance(stage)
@@ -179,7 +182,10 @@ def compare_cycles(
 
 
 def on_rail(stage: Stage) -> Stage:
-    """Return the stage on a rail with the same friction everywhere, whose keys can be changed."""
+    """Return the stage on a rail with the same friction everywhere.
+
+    The keys of this rail can then be changed.
+    """
     seed = 1.0 if stage.rail is None else stage.flat()["rail.seed"]
     level = 0.0 if stage.rail is None else stage.flat()["rail.offset"]
     bare = stage.replace({"rail": None}) if stage.rail is not None else stage
@@ -193,8 +199,10 @@ def _longer(task: MoveTask) -> MoveTask:
 def started(
     stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, label: str
 ) -> RailRuns:
-    """Return what became of machines, shape (count,),
-    at the first start after which each swings on; else after the move."""
+    """Return how runs of machines end, shape (count,).
+
+    Each machine takes the first start after which it keeps swinging, or else the move.
+    """
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
     all_runs = concatenate_runs(runs).shaped(len(tasks), count)
@@ -213,7 +221,7 @@ def moves_on_varied_rails(
     progress: Progress,
     label: str,
 ) -> tuple[RailRuns, np.ndarray]:
-    """Return the moves on all rails of all cases, and the asymmetry of friction around their targets.
+    """Run the moves on all rails of all cases; return them and the asymmetry around their targets.
 
     Runs and asymmetries have the shape (cases * rails,).
     """
@@ -242,7 +250,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
 
 
 def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
-    """Return cycles with one property changed, by its name."""
+    """Return cycles with one property changed, by the name of the property."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}
@@ -272,7 +280,7 @@ def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, Rai
 
 
 def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:
-    """Return the slowest of the cycles of a similar swing on the rails with a field, in time."""
+    """Add, in time, the slowest of the cycles with a similar swing on rails with a field."""
     similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
     slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
     if not slower.max(initial=0.0) > 1:
@@ -298,7 +306,7 @@ def _trace(stage: Stage, seed: int) -> Trace:
 def _logged_machines(
     stage: Stage, seed: int, slowest: tuple[float, float, float] | None
 ) -> list[tuple[str, Stage, int]]:
-    """Name, stage and seed of the noise of each log."""
+    """Return name, stage and noise seed of each log."""
     even = on_rail(stage)
     first = even.flat()["rail.seed"]
     machines = [("measured_cycles_even_rail", even, seed)]

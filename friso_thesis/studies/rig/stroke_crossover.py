@@ -1,7 +1,4 @@
-"""On which fraction of rails peaks are counted, over stroke and crossover.
-
-Thesis, Fig. 26.
-"""
+"""Find on which fraction of rails peaks are counted, over stroke and crossover (thesis, Fig. 26)."""
 
 from __future__ import annotations
 
@@ -26,12 +23,11 @@ from friso.studies.rig.moves_on_rails import (
 from friso.studies.rig.outcome import Outcome, rig_log
 
 CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
-"""Crossovers relative to that of the stage.
-
-The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our choice."""
+"""Crossovers relative to the stage's. The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our
+choice."""
 
 STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
-"""Strokes relative to that of the stage: up to 1 mm in Table 3; the steps are our choice."""
+"""Strokes relative to the stage's: up to 1 mm in Table 3. The steps are our choice."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +45,10 @@ class StrokeCrossover:
 
     @property
     def share(self) -> np.ndarray:
-        """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers);
-        NaN where all runs failed."""
+        """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers).
+
+        It is NaN where all runs failed.
+        """
         done = ~self.runs.failed
         count = done.sum(axis=2)
         counted = (self.runs.counted & done).sum(axis=2)
@@ -63,8 +61,10 @@ class StrokeCrossover:
 
     @property
     def limits(self) -> np.ndarray:
-        """By stroke the crossover [Hz] halfway from the last at which any rail has counted peaks to the next, shape
-        (strokes,): 0 where none has, infinite where some have at the highest."""
+        """Return for each stroke the crossover [Hz] up to which any rail has counted peaks, (strokes,).
+
+        It lies halfway to the next crossover. It is 0 if no rail has any, and infinite if some have at the highest.
+        """
         limits = np.zeros(len(self.strokes))
         for row, counted in enumerate(self.share > 0):
             if counted.any():
@@ -74,8 +74,10 @@ class StrokeCrossover:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Return the move at all strokes and crossovers on all rails, the joint free.
-    Raises InputError without a joint."""
+    """Run the move at all strokes and crossovers on all rails, with the joint free.
+
+    Raises InputError without a joint.
+    """
     free = with_joint(stage, locked=False)
     result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
     corners = {"joint.stroke": result.strokes[[0, -1]], crossover_key(stage): np.full(2, crossover(stage))}
@@ -91,8 +93,10 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def stroke_crossover(
     stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray, progress: Progress
 ) -> StrokeCrossover:
-    """Return the grid of `strokes` and crossovers (`factors`) over those of the stage,
-    [m] and [Hz], on rails."""
+    """Run moves on a grid of strokes and crossovers, on rails.
+
+    `strokes` and `factors` are relative to the stage's stroke and crossover [-].
+    """
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     cases = {
         "joint.stroke": np.repeat(sizes, len(frequencies)),

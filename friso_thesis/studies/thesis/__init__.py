@@ -1,4 +1,4 @@
-"""The thesis's studies, claims and their reproduction."""
+"""Reproduce the thesis: its studies and its claims."""
 
 from friso_thesis.studies.thesis.claims import Claim, Evidence, Finding, Part, Response, claims, judges
 from friso_thesis.studies.thesis.reading import CONVENTIONS

@@ -1,5 +1,7 @@
-"""The thesis's rig with its drive as built: its loops and plants as they would be measured (Sec. 4.2.1, 4.2.4), and the
-hunting experiments (Sec. 4.3.2), in sizes for a reproduction."""
+"""Run the thesis's rig with its real drive, in sizes for a reproduction.
+
+The module has loops and plants as they would be measured (Sec. 4.2.1, 4.2.4), and the hunting experiments (Sec. 4.3.2).
+"""
 
 from __future__ import annotations
 
@@ -66,13 +68,12 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
         "cable.drag": "0.1 N*s/m",
     }
 )
-"""The drive by Sec. 3.5.2 (sample time, resolutions, peak force); the rest is our choice. It is that of the example
-thesis_drive.toml, with which `friso rig` runs the same experiments."""
+"""The drive by Sec. 3.5.2 (sample time, resolutions, peak force); the rest is our choice. The example
+thesis_drive.toml, with which `friso rig` runs the same experiments, has the same drive."""
 
 COULOMB_LEVEL = 2.0
-"""Coulomb friction relative to that of the rig, with the weaker motor.
-
-It is our choice among the levels of `friso rig measured-cycles`."""
+"""Coulomb friction relative to the rig's, with the weaker motor. It is our choice among the levels of `friso rig
+measured-cycles`."""
 
 SEED = 1
 RAILS = 20
@@ -82,19 +83,22 @@ CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 """Crossovers relative to 8 Hz (Sec. 4.3.2)."""
 
 DISPLACEMENTS = (-0.05, 0.05)
-"""Displacements of the releases relative to the distance of the move: 5 mm to either side."""
+"""Displacements of the releases over the distance of the move: 5 mm to either side."""
 
 STROKES, LOOPS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
-"""Strokes over that of the rig and crossovers over 8 Hz of Fig. 26; each cell has `RAILS`."""
+"""Strokes over the rig's and crossovers over 8 Hz, for Fig. 26. Each cell has `RAILS`."""
 
 NOISES = (0.1, 0.3, 1.0, 3.0, 10.0)
-"""Noise of the drive's force of Fig. 28, which the thesis does not state, over friso's choice."""
+"""Factors on friso's choice of the drive's force noise in Fig. 28, which the thesis does not state."""
 
 
 @dataclass(frozen=True)
 class MovesOnRails:
-    """Fig. 24, 25: moves with the joint `locked`, shape (crossovers, rails), and `free` at the first crossover, shape
-    (rails,); releases with it locked at the second, shape (displacements, rails). Crossovers [Hz]."""
+    """Moves of Fig. 24 and 25.
+
+    `locked` has the shape (crossovers, rails), and `free`, at the first crossover, (rails,). `released` are releases
+    with the joint locked at the second crossover, shape (displacements, rails). Crossovers are in [Hz].
+    """
 
     crossovers: np.ndarray
     locked: RailRuns
@@ -106,8 +110,8 @@ class MovesOnRails:
 class CyclesOnRails:
     """Cycles of Fig. 27 on an even rail, one run, and on rails that vary, shape (rails,).
 
-    The asymmetry is that of friction about the target. `weak` is the even rail again, one run. Its motor is so weak
-    that the mass line shows the mass measured (`MOTORS`), and it has `COULOMB_LEVEL` times the Coulomb friction.
+    `asymmetry` is that of friction about the target. `weak` is the even rail again, one run, with a motor so weak that
+    the mass line shows the measured mass (`MOTORS`), and with `COULOMB_LEVEL` times the Coulomb friction.
     """
 
     even: RailRuns
@@ -117,8 +121,10 @@ class CyclesOnRails:
 
 
 def _prescribed(stage: Stage) -> Stage:
-    """Return the rig with its drive, moved as Sec. 4.3.2 prescribes, by 100 mm at 100 m/s^2,
-    whatever the path of the simulations is; `move` takes the acceleration of this path, and rounds its 90 mm to them.
+    """Return the rig with its drive, moved as Sec. 4.3.2 prescribes: by 100 mm at 100 m/s^2.
+
+    `move` takes the acceleration from this path, and rounds its 90 mm to 100 mm. The simulation's own path does not
+    matter.
     """
     time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
     own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}
@@ -131,7 +137,7 @@ def rig_with_drive(stage: Stage) -> Stage:
 
 
 def moves(stage: Stage) -> MovesOnRails:
-    """Return the moves of Fig. 24 and 25, on several rails."""
+    """Run the moves of Fig. 24 and 25 on several rails."""
     machine = _prescribed(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
     seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
@@ -147,13 +153,13 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Return moves over strokes and crossovers on all rails (Fig. 26)."""
+    """Run moves over strokes and crossovers on all rails (Fig. 26)."""
     seeds = 1.0 + np.arange(float(RAILS))
     return stroke_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
 
 def cycles(stage: Stage) -> CyclesOnRails:
-    """Return cycles on an even rail and on varied rails, the joint locked (Fig. 27)."""
+    """Run cycles on an even rail and on varied rails, with the joint locked (Fig. 27)."""
     machine = _prescribed(stage)
     even = on_rail(with_joint(machine, locked=True))
     run = started(even, SEED, {}, 1, silent, "")
@@ -172,7 +178,7 @@ _FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("
 
 
 def standstill(stage: Stage) -> InPosition:
-    """Return the rig at a standstill under each disturbance (Fig. 28)."""
+    """Run the rig at a standstill under each disturbance (Fig. 28)."""
     return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
 
 
@@ -181,7 +187,7 @@ class RailTraces:
     """Logs of single moves on one rail that varies, and on an even one.
 
     They have the time [s], shape (n,), and the position less the end of the move [m], by joint and crossover [Hz] and
-    by rail, each of shape (n,). `distance` [m] is that of the move.
+    by rail, each of shape (n,). `distance` [m] is the length of the move.
     """
 
     time: np.ndarray
@@ -191,7 +197,7 @@ class RailTraces:
 
 
 def traces(stage: Stage, rail: int) -> RailTraces:
-    """Return logs of single moves on a rail, chosen by its number from 0 (Fig. 24, 25 and 27)."""
+    """Run single moves on the rail with a number, counted from 0, and on an even one (Fig. 24, 25, 27)."""
     machine = _prescribed(stage)
     frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
     held, loose = (with_joint(machine, locked) for locked in (True, False))
@@ -209,9 +215,12 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 
 @dataclass(frozen=True)
 class RigLoops:
-    """Open loops locked at several settings, and free at the lowest of these, with the plant of the free joint;
-    settings [Hz] tried free, shape (n,), and which were stable; apparent masses [kg], shape (2, ratios), locked and
-    free, for the motor constants RATIOS."""
+    """Open loops and masses of the rig with its real drive.
+
+    Loops are given locked at several settings, and free at the lowest of these, with the plant of the free joint.
+    Settings [Hz] were tried free, shape (n,); `stable` tells which were stable. Apparent masses [kg], shape (2,
+    ratios), are locked and free, for the motor constants RATIOS.
+    """
 
     locked: tuple[MeasuredLoop, ...]
     free: MeasuredLoop
@@ -222,7 +231,7 @@ class RigLoops:
 
 
 def rig_loops(stage: Stage) -> RigLoops:
-    """Return the loops of a rig with its drive as built."""
+    """Measure the loops of a rig with its real drive."""
     built = rig_with_drive(stage)
     fixed, free, place = locked_stage(built), freed(built), travel(built)[0]
     log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)

@@ -1,4 +1,7 @@
-"""The claims of the thesis and how they were judged: parts that hold or not, by a criterion stated in words."""
+"""Define the claims of the thesis and their judgement.
+
+A claim consists of parts that hold or not, each by a criterion in words.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +23,16 @@ if TYPE_CHECKING:
     from friso_thesis.studies.thesis.linear import Linear
 
 ClaimJudgement = Literal["holds", "depends", "holds in part", "differs", "cannot be decided", "not yet covered"]
-"""The judgement of a claim. "depends": it holds for some plausible values of what the thesis leaves open, and not for
-others. "cannot be decided": it rests on what no simulation shows, or on a number beside its threshold."""
+"""Judgement of a claim. "depends": it holds for some plausible values of what the thesis leaves open, and not for
+others. "cannot be decided": no simulation shows it, or a number lies beside its threshold."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One row of the table of claims: `text` is the claim in short, as it is judged."""
+    """One row of the table of claims.
+
+    `text` is the claim in short, in the words in which it is judged.
+    """
 
     id: str
     where: str
@@ -39,7 +45,7 @@ class Claim:
 
     @property
     def place(self) -> tuple[int, ...]:
-        """Return the section of the thesis with the claim, to sort by."""
+        """Return the section of the thesis with the claim, for sorting."""
         return tuple(int(number) for number in self.section.split("."))
 
 
@@ -52,13 +58,13 @@ def claims() -> tuple[Claim, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """One testable statement of a claim: the criterion in words, whether it is met, and the number found.
+    """One testable statement of a claim: criterion in words, whether it is met, and the number found.
 
-    `why` is the reason found where it is not met, in whole sentences, the first of which says the most. `printed` is a
-    number that the thesis prints and `read` the same as friso finds it, both in the same unit, NaN where there is none.
-    A `self_test` checks that friso finds what friso entered: it says nothing of the thesis, and counts for no
-    judgement. A part that is `undecided` counts for none either; the text says why: no simulation can decide it, or
-    the number lies beside its threshold within its error.
+    `why` gives the reason if it is not met, in whole sentences, the most important first. `printed` is a number that
+    the thesis prints and `read` the one that friso finds, both in the same unit, NaN without one. A `self_test` checks
+    that friso finds what friso entered: it says nothing about the thesis, and counts for no judgement. An `undecided`
+    part counts for none either. Its text says why: no simulation can decide it, or the number lies beside its threshold
+    within its error.
     """
 
     criterion: str
@@ -76,13 +82,13 @@ BESIDE = "The number lies beside its threshold, within its error."
 
 
 def beside(value: float, thresholds: Iterable[float], error: float) -> str:
-    """Return `BESIDE` if a value lies within its error of one of the thresholds, else an empty text."""
+    """Return `BESIDE` if a value lies within its error of one of the thresholds, else ""."""
     return BESIDE if any(abs(value - threshold) <= error for threshold in thresholds) else ""
 
 
 @dataclass(frozen=True)
 class FindingTable:
-    """Numbers of a finding that a sentence would bury: columns, and rows of as many texts."""
+    """Numbers of a finding that would fill a sentence: columns, and rows of as many texts."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -97,7 +103,7 @@ class Finding:
 
     @property
     def stated(self) -> tuple[Part, ...]:
-        """Return the parts that say something of the thesis."""
+        """Return the parts that say something about the thesis."""
         return tuple(part for part in self.parts if not part.self_test)
 
     @property
@@ -107,8 +113,11 @@ class Finding:
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """ "holds" if all decided parts are met, "differs" if none is, else "holds in part";
-        "cannot be decided" if no part is decided."""
+        """Return the judgement that follows from the parts.
+
+        It is "holds" if all decided parts are met, "differs" if none is, else "holds in part"; "cannot be decided" if
+        no part is decided.
+        """
         decided = [holds for holds in self.pattern if holds is not None]
         if not decided:
             return "cannot be decided"
@@ -116,14 +125,17 @@ class Finding:
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:
-    """Return a number with its unit, or that there is none (NaN)."""
+    """Return a number with its unit; for NaN, say that there is none."""
     return f"{value:{form}} {unit}".rstrip() if math.isfinite(value) else "none"
 
 
 @dataclass(frozen=True)
 class Response:
-    """One run: `cell`, the scalars of a sweep (peaks, peak_to_peak [m], period [s], verdict); `trace`, its time
-    response as `friso.simulate` gives it."""
+    """One run.
+
+    `cell` has the scalars of a sweep (peaks, peak_to_peak [m], period [s], verdict), and `trace` the time response as
+    `friso.simulate` gives it.
+    """
 
     cell: xr.Dataset
     trace: xr.Dataset
@@ -161,9 +173,12 @@ Judge = Callable[[Evidence], Finding]
 
 @dataclass(frozen=True)
 class Registered:
-    """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the
-    linear analysis and experiments that it needs; on what it hangs that no draw changes (`undrawn`); and whether it is
-    about runs alone (`of_runs`), so that what attracts does not enter."""
+    """A judge of a claim, and what it needs.
+
+    It has the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the linear
+    analysis and experiments that it needs. `undrawn` names assumptions that decide on it and are in no draw. A judge
+    `of_runs` is about runs alone, so that attractors do not matter.
+    """
 
     judge: Judge
     figure: str
@@ -178,8 +193,11 @@ _JUDGES: dict[str, Registered] = {}
 def judges(
     claim: str, figure: str, needs: tuple[str, ...] = (), undrawn: str = "", of_runs: bool = False
 ) -> Callable[[Judge], Judge]:
-    """Register the decorated function as judge of a claim; `undrawn` are assumed values that decide on it and are in no
-    draw, and a claim `of_runs` is not judged by what attracts. Raises ValueError for an unknown or taken claim."""
+    """Register the decorated function as judge of a claim.
+
+    `undrawn` are assumed values that decide on it and are in no draw; a claim `of_runs` is not judged by attractors.
+    Raises ValueError for an unknown or taken claim.
+    """
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
     if claim in _JUDGES:
@@ -193,8 +211,10 @@ def judges(
 
 
 def registered() -> Mapping[str, Registered]:
-    """Return the judges by claim, those that stand in `friso_thesis.studies.thesis.judges` and
-    any registered later."""
+    """Return the judges by claim.
+
+    They come from `friso_thesis.studies.thesis.judges`, and from later registrations.
+    """
     import friso_thesis.studies.thesis.judges  # noqa: F401 (registers them)
 
     return dict(_JUDGES)

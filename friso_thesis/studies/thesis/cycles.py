@@ -1,7 +1,6 @@
-"""Find the attractors of the stages in the thesis's maps,
-and compare them with the peak count.
+"""Find the attractors of the stages in the thesis's maps, and compare them with the peak count.
 
-The curves on which cycles stop attracting are drawn as well.
+The module also follows the curves on which cycles stop attracting.
 """
 
 from __future__ import annotations
@@ -24,21 +23,22 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SURVEYED = 14
-"""Approximate number of values per axis at which the stage is surveyed; a cell takes a hundred runs."""
+"""Approximate number of values per axis at which stages are surveyed. Each survey takes a hundred runs."""
 
 NODES = 9
-"""Number of stages along either axis from which curves are searched."""
+"""Number of stages along either axis from which curves are searched for."""
 
 SMALLEST = 1e-3
-"""Start of curves on a linear range that begins at zero, as a fraction of the range.
-
-There may be no stage at zero."""
+"""Start of curves on a linear range that begins at zero, as a fraction of the range. There may be no stage at zero."""
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A curve on which a cycle stops attracting: its kind, whether it is of the symmetric cycle, and its points [SI]
-    along the two axes of the map, shape (points,) each."""
+    """A curve on which a cycle stops attracting.
+
+    It has a kind, whether the cycle is the symmetric one, and its points [SI] along the two axes of the map, shape
+    (points,) each.
+    """
 
     kind: Bifurcation
     symmetric: bool
@@ -50,9 +50,11 @@ class Edge:
 class PeaksAgainstCycles:
     """Agreement of the peak count with the survey, in numbers of cells.
 
-    Peaks are counted and something attracts (`both`), or `neither`. Peaks are counted although nothing attracts
-    (`counted_only`). Something attracts although no peaks are counted (`attracted_only`: another move would start it).
-    The other cells are uncertain.
+    - `both`: peaks are counted, and something attracts.
+    - `neither`: no peaks, and nothing attracts.
+    - `counted_only`: peaks, although nothing attracts.
+    - `attracted_only`: no peaks, although something attracts; another move would start it.
+    - `unknown`: the answer is uncertain.
     """
 
     cells: int
@@ -65,7 +67,7 @@ class PeaksAgainstCycles:
 
 @dataclass(frozen=True)
 class CyclesOnMap:
-    """The curves over a map of the thesis, and the comparison with its peak counts."""
+    """Curves over a map of the thesis, and the comparison of attractors with its peak counts."""
 
     edges: tuple[Edge, ...]
     comparison: PeaksAgainstCycles
@@ -73,21 +75,25 @@ class CyclesOnMap:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """Some of the cells of a map, evenly spread; whether anything attracts their stages, and whether that is
-    certain, of the shape of the runs."""
+    """Evenly spread cells of a map.
+
+    For each it is stored whether anything attracts its stage, and whether that is certain, in the shape of the runs.
+    """
 
     runs: xr.Dataset
     attracts: np.ndarray
     decided: np.ndarray
 
     def attracted(self, edges: Sequence[Edge]) -> xr.Dataset:
-        """Return the runs by what attracts their stages, with their distances from the edges of attraction."""
+        """Return the runs with attraction as criterion, and distances from the edges of attraction."""
         return by_attraction(by_peak_count(self.runs), self.attracts, self.decided, cells_apart(self.runs, edges))
 
 
 def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
-    """Return the distances of the cells of a map from the nearest of some curves, in cells, of the shape of the runs;
-    infinite without a curve."""
+    """Return the distances of a map's cells from the nearest of some curves, in cells.
+
+    They have the shape of the runs, and are infinite without a curve.
+    """
     axes = [runs[name].values for name in runs.dims]
     rows, columns = np.meshgrid(*(np.arange(len(axis), dtype=float) for axis in axes), indexing="ij")
     nearest = np.full(rows.shape, np.inf)
@@ -104,8 +110,7 @@ def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
 
 
 def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
-    """Return the hunting cycles over a map of the thesis, from the study,
-    its runs and what was surveyed of them."""
+    """Find the curves of a study's map, and compare the survey with the runs."""
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
     about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
@@ -126,7 +131,7 @@ def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
-    """Return what attracts the stages of a map."""
+    """Survey what attracts the stages of a map."""
     coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
     axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
     flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))
@@ -135,7 +140,7 @@ def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
 
 
 def every(values: int) -> int:
-    """Return the step between surveyed values of an axis with so many values."""
+    """Return the step between surveyed values on an axis with `values` values."""
     return max(1, round((values - 1) / (SURVEYED - 1)))
 
 
@@ -164,8 +169,10 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
-    """Return the curves over a map; none where the axes belong to the motion,
-    which plays no part."""
+    """Return the curves over a map.
+
+    There are none if the axes belong to the motion, which plays no part.
+    """
     if study.of_motion:
         return ()
     source = study_of(runs)

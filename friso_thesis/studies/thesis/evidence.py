@@ -1,5 +1,4 @@
-"""Compute the evidence for judges: maps of the studies, and runs in time,
-of the rig with or without changes."""
+"""Compute the evidence for judges: maps of the studies, and runs in time, of the rig with changes."""
 
 from __future__ import annotations
 
@@ -33,8 +32,8 @@ RESPONSES: Mapping[str, Mapping[str, object]] = {
     HIGH_ALPHA: {**LOCKED, ALPHA: 0.2},
     HEAVIEST: {**LOCKED, **masses(5.1)},
 }
-"""What runs in time change in the rig: those of Fig. 5 and 13, and some that differ in their masses or in alpha alone,
-whatever those of the rig are."""
+"""Changes of the rig for each run in time. They are those of Fig. 5 and 13, and some that change only the masses or
+alpha, whatever values the rig has."""
 
 
 def maps_of(
@@ -44,8 +43,10 @@ def maps_of(
     verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
 ) -> dict[str, xr.Dataset]:
-    """Return the maps of some studies by name, `points` values per axis,
-    `changes` being made to the rig before."""
+    """Compute the maps of some studies by name, with `points` values per axis.
+
+    `changes` are made to the rig first.
+    """
     return {study.name: map_of(study, points, rtol, verify, changes) for study in studies}
 
 
@@ -57,14 +58,17 @@ def map_of(
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> xr.Dataset:
-    """Return the map of one study, as it was kept or computed now."""
+    """Return the map of one study, from the folder or computed now."""
     stage, axes, links = study.stage(changes), study.axes(points), dict(study.links)
     request = Request(stage, axes, None, links).study(None, rtol)
     return kept.runs(request, verify, lambda: sweep(stage, axes, links=links, rtol=rtol, verify=verify))
 
 
 def run_response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
-    """One run in time; other changes of the rig come before the run's own, which distinguish it from the others."""
+    """Run the rig once in time.
+
+    The run's own changes, which distinguish it, come after the other changes of the rig.
+    """
     stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     return Response(cell, simulate(stage, rtol))
@@ -78,8 +82,10 @@ def evidence(
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> Evidence:
-    """Return all that is needed, by the names of maps, responses, and parts of the analysis,
-    of the rig with `changes`; experiments are run when they are asked for."""
+    """Compute all that is needed, for the rig with `changes`.
+
+    Needs are names of maps, responses, and parts of the analysis. Experiments are run later, when they are requested.
+    """
     wanted, rig = set(needs), thesis_rig().replace(dict(changes))
     return Evidence(
         {name: map_of(study, points, rtol, verify, changes, kept) for name, study in STUDIES.items() if name in wanted},

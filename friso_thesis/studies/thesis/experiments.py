@@ -1,6 +1,7 @@
-"""The thesis's identification of its rig (Sec. 4.2, Fig. 17 and 19 to 21), simulated, and read as measured.
+"""Simulate the thesis's identification of its rig (Sec. 4.2, Fig. 17 and 19 to 21).
 
-The simulated rig has the friction of one place all along its rail, and no noise; for Fig. 17 alone several places.
+Records are evaluated as measured. The simulated rig has equal friction all along its rail, and no noise; only for Fig.
+17 does it have several places.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ from friso_thesis.studies.thesis.linear import PartNeeded
 from friso_thesis.studies.thesis.studies import LOCKED
 
 FORCE = 5.0
-"""Amplitude [N] of the identification with the joint locked, which the thesis does not give: some times the friction
-that it finds."""
+"""Force amplitude [N] of the identification with the joint locked, which the thesis does not give: some times the
+friction that it finds."""
 
 RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
-"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the fraction of it
-that is Coulomb friction (as in Table 2): number and share are our choice."""
+"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly; number of places; and Coulomb
+friction as a fraction of static friction (as in Table 2). Number and fraction are our choice."""
 
 FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
 """Frequencies [Hz] of the response with friction."""
@@ -60,13 +61,15 @@ SAMPLE_TIME = 1e-3
 """Sample time of the records [s]: the thesis gives none."""
 
 STEP, STEPS, STANDS = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
-"""Size of a step [m] (Sec. 4.2.2), their directions, and the time [s] for which each stands: both our choice."""
+"""Size of a step [m] (Sec. 4.2.2), directions of the steps, and the time [s] for which each stands. The latter two are
+our choice."""
 
 FIXED_CART = "1e9 kg"
 """Mass of a cart that does not move: 1 N displaces it by less than a thousandth of a micrometre in 10 s."""
 
 SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
-"""Speeds of slow motion [m/s] and their time [s]: the thesis gives neither; up to the slower one of Fig. 21."""
+"""Speeds of slow motion [m/s], and their time [s]. The thesis gives neither; the speeds go up to the slower one of Fig.
+21."""
 
 STROKE = "8 mm"
 """Stroke to the limiters during identification (Sec. 4.2.1)."""
@@ -74,10 +77,10 @@ STROKE = "8 mm"
 
 @dataclass(frozen=True)
 class LockedLine:
-    """Fig. 17: magnitude and phase over the mass line.
+    """Mass line of the locked rig (Fig. 17).
 
-    The magnitude and the phase [rad] over those of the mass line have the shape (places, frequencies). The scatter of
-    the phase over the places [rad], shape (frequencies,), is at FREQUENCIES.
+    Magnitude and phase [rad] over those of the mass line have the shape (places, frequencies). The scatter of the phase
+    over the places [rad] has the shape (frequencies,). All are at FREQUENCIES.
     """
 
     magnitude: np.ndarray
@@ -87,7 +90,7 @@ class LockedLine:
 
 @dataclass(frozen=True)
 class JointSteps:
-    """Fig. 19: the record, the analysis of it, and the joint's stiffness [N/m] that it was simulated with."""
+    """Steps of the joint (Fig. 19): the record, its analysis, and the true joint stiffness [N/m]."""
 
     log: Log
     result: StepStiffness
@@ -96,7 +99,7 @@ class JointSteps:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """Fig. 20: speed [m/s], the record, the analysis of it, and the static friction [N] it was simulated with."""
+    """Slow motion (Fig. 20): speed [m/s], the record, its analysis, and the true static friction [N]."""
 
     speed: float
     log: Log
@@ -106,7 +109,7 @@ class SlowMotion:
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """Fig. 21: passes there and back at constant speeds, on the rail as built.
+    """Passes there and back at constant speeds on the real rail (Fig. 21).
 
     `velocities` [m/s] are those of the passes, each a segment of the log; `result` is friction along the rail.
     """
@@ -117,16 +120,16 @@ class ConstantSpeed:
 
 
 LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
-"""Names of the experiments, by which judges request them."""
+"""Names of the experiments by which judges request them."""
 
 BUILT = "rig_loops"
-"""Name of the loops and plants of the rig as built (Sec. 4.2)."""
+"""Name of the loops and plants of the rig with its real drive (Sec. 4.2)."""
 
 MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
-"""Names of the experiments with the rig as built (Sec. 4.3.2): moves, their maps, cycles, and standstill."""
+"""Names of the experiments with the real drive (Sec. 4.3.2): moves, their maps, cycles, and standstill."""
 
 TRACES = "traces"
-"""Name of the single moves of the rig as built, which are shown but not judged."""
+"""Name of the single moves with the real drive, which are shown but not judged."""
 
 EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
     {
@@ -145,8 +148,10 @@ EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
 
 
 class Experiments:
-    """The experiments on one rig, each run when it is first asked for, unless it was `kept`; the constant speeds are
-    with the joint free, and locked; the loops with its drive as built."""
+    """Experiments on one rig, each run on first use, unless it was `kept`.
+
+    Constant speeds are run with the joint free, and locked; the loops with the real drive.
+    """
 
     def __init__(self, stage: Stage, kept: Kept = NOT_KEPT) -> None:
         self._stage_file, self._kept = stage.to_toml(), kept
@@ -174,7 +179,7 @@ class Experiments:
 
     @property
     def rig_loops(self) -> RigLoops:
-        """Return loops and plants of the rig as built (Fig. 17, 18, 22, 23)."""
+        """Return loops and plants of the rig with its real drive (Fig. 17, 18, 22, 23)."""
         return self._result(BUILT)
 
     @property
@@ -217,7 +222,7 @@ def _experiment(name: str, stage_file: str) -> Any:
 
 
 def locked_line(stage: Stage) -> LockedLine:
-    """Return the response of the locked rig to sines of one force at places of other friction."""
+    """Simulate the response of the locked rig to sines of one force, at places with different friction."""
     places = [
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]
@@ -246,7 +251,7 @@ def joint_steps(stage: Stage) -> JointSteps:
 
 
 def slow_motion(stage: Stage, speed: float) -> SlowMotion:
-    """Simulate stick-slip at a `speed` [m/s] with the joint free, and analyse it with the joint's stiffness."""
+    """Simulate stick-slip at a `speed` [m/s] with the joint free, and analyse it with its stiffness."""
     free = stage.replace({"joint.stroke": STROKE, "joint.locked": False})
     log = _ramp(free, speed, SLOW_TIME)
     flat = stage.flat()
@@ -254,7 +259,7 @@ def slow_motion(stage: Stage, speed: float) -> SlowMotion:
 
 
 def constant_speed(machine: Stage) -> ConstantSpeed:
-    """Make passes of a rig as built over 150 mm, there and back at both speeds."""
+    """Simulate passes over 150 mm with the real drive, there and back at both speeds."""
     whole, flat = passes_log("constant speed", machine, SEED).log, machine.flat()
     stretches = passes(whole)
     log = replace(whole, segments=tuple(stretch.span for stretch in stretches))
@@ -271,7 +276,7 @@ def _ramp(stage: Stage, speed: float, duration: float) -> Log:
 
 
 def _with_motion(stage: Stage, **motion: Any) -> Stage:
-    """Return the stage with a motion of another kind, of which other keys are left out."""
+    """Return the stage with another kind of motion, without keys that this kind does not have."""
     rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
     text = stage.to_toml()
     begin = text.index("[motion]")
@@ -280,8 +285,10 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
 
 
 def _lively_rail(moves: MovesOnRails) -> int:
-    """Return the first rail on which peaks are counted at the lowest crossover, joint locked;
-    the first where there is none."""
+    """Return the number of the first rail with counted peaks at the lowest crossover, joint locked.
+
+    It is the first rail if there is none.
+    """
     return int(np.argmax(moves.locked.counted[0]))
 
 

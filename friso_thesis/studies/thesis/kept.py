@@ -1,5 +1,7 @@
-"""Keep finished parts of a long reproduction in a folder until all is done,
-so that an interrupted run goes on from there."""
+"""Keep finished parts of a long reproduction in a folder until all is done.
+
+An interrupted run continues from them.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +41,8 @@ SOURCES = (
     ),
     *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml", "shares.py"),
 )
-"""Folders and files, besides the equations, whose contents decide on saved results.
-
-Paths start from the package friso."""
+"""Folders and files, besides the equations, whose contents decide on saved results. Paths start from the package
+friso."""
 
 Findings = dict[str, Finding]
 """Findings by name, such as that of a claim."""
@@ -53,7 +54,7 @@ class Kept(KeptWork):
     sources = SOURCES
 
     def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-        """Return the runs of a study, as they were kept or made now."""
+        """Return the runs of a study, from the folder or computed now."""
         axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
         file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
         columns = None if file is None else kept_arrays(file)
@@ -70,12 +71,11 @@ class Kept(KeptWork):
         return runs
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
-        """Return arrays by name `about` something, as they were kept or made now."""
+        """Return arrays saved under `about`, or computed now."""
         return self.arrays(("flags", *about), make)
 
     def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
-        """Return a result of a kind (see `taken_apart`) `about` something,
-        as it was kept or made now."""
+        """Return a result of a kind (see `taken_apart`), saved under `about` or computed now."""
         file = self._file("npz", "result", *about)
         columns = None if file is None else kept_arrays(file)
         if columns is not None:
@@ -87,7 +87,7 @@ class Kept(KeptWork):
         return made
 
     def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
-        """Return the findings `about` something, saved or computed now."""
+        """Return the findings saved under `about`, or computed now."""
         file = self._file("json", "findings", *about)
         if file is not None and (kept := kept_findings(file)) is not None:
             return kept

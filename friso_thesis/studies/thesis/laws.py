@@ -1,7 +1,7 @@
-"""The thesis's conclusions under each friction law: which of them survive, and which were those of LuGre.
+"""Judge the thesis's conclusions under each friction law.
 
-The friction of the rig is converted to every other law (`friso.studies.laws.conversion`), the maps are computed again,
-and the same judges judge them by the same criteria.
+Some survive other laws, and some hold for LuGre alone. The friction of the rig is converted to every other law
+(`friso.studies.laws.conversion`), the maps are computed again, and the same judges apply the same criteria.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CONCLUSIONS = ("E1", *(f"F{figure}{panel}" for figure in (11, 12, 13, 14, 15, 16) for panel in ("", "A", "B")))
-"""The claims that are judged under each law, where they exist."""
+"""Claims that are judged under each law, if they exist."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,14 @@ class ConclusionByLaw:
     findings: Mapping[str, Finding]
 
     def judgement(self, law: str) -> ClaimJudgement:
-        """Return how it is judged under a law."""
+        """Return the judgement of the conclusion under a law."""
         return self.findings[law].judgement
 
     def turned(self, law: str) -> tuple[str, ...]:
-        """Return the numbers of the parts that hold under a law where they do not under the thesis's
-        own, or the reverse."""
+        """Return the numbers of the parts that hold under just one of two laws.
+
+        The laws are the given one and the thesis's own.
+        """
         first = next(iter(self.findings.values()))
         pairs = zip(first.parts, self.findings[law].parts, strict=True)
         return tuple(other.number for own, other in pairs if own.holds != other.holds)
@@ -49,8 +51,10 @@ class ConclusionByLaw:
 
 @dataclass(frozen=True)
 class ConclusionsByLaw:
-    """The conclusions under each law that keeps what is measured, the thesis's own first; and the laws that were
-    `left_out`: what they do not keep."""
+    """Conclusions under each law that keeps the measured friction, the thesis's own first.
+
+    `left_out` lists the other laws, with what they do not keep.
+    """
 
     laws: tuple[str, ...]
     left_out: Mapping[str, tuple[MeasuredKind, ...]]
@@ -63,8 +67,7 @@ class ConclusionsByLaw:
 
 
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
-    """Return the conclusions of the thesis under each law,
-    on the studies and the grid of a reproduction: of the claims that it judged."""
+    """Judge the claims of a reproduction under each law, on its studies and its grid."""
     studies, rig = [STUDIES[name] for name in reproduction.judged], thesis_rig()
     own = rig.flat()["friction.model"]
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
@@ -103,8 +106,10 @@ def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response],
 
 
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
-    """Return the rig under a law: as converted, or, where that is the rig's own law,
-    with what is left open as far from it as measurements allow."""
+    """Return the rig converted to a law.
+
+    If that is the rig's own law, values that measurements leave open are moved as far as measurements allow.
+    """
     same = all(change.off <= change.allowed / 10 for change in conversion.compared)
     if not same:
         return conversion

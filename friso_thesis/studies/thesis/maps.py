@@ -1,5 +1,4 @@
-"""Read maps for judges: where runs keep moving, limits, trends,
-and blocks in which they come to rest."""
+"""Read maps for judges: where runs keep moving, limits, trends, and blocks that come to rest."""
 
 from __future__ import annotations
 
@@ -16,8 +15,11 @@ if TYPE_CHECKING:
 
 
 def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates of rows and columns [SI], whether runs keep moving, by their criterion (its attribute: the thesis's
-    count, or the end of the run), and valid, both booleans of shape (rows, columns)."""
+    """Return values of rows and columns [SI], which runs keep moving, and which are valid.
+
+    The latter two are booleans of shape (rows, columns). The criterion for moving is an attribute of the runs: the
+    thesis's count, or the end of the run.
+    """
     moving, outcome = (runs[name].transpose(rows, columns).values for name in ("keeps_moving", "outcome"))
     valid = (outcome != "invalid") & (outcome != FAILED)
     return runs[rows].values, runs[columns].values, moving & valid, valid
@@ -37,13 +39,11 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 
 
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """Return, for each column of `moving`, shape (n, columns),
-    the value beyond which no run keeps moving.
+    """Return, for each column of `moving`, (n, columns), the value beyond which no run keeps moving.
 
     `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is where the
     `size` of the swings, interpolated in its logarithm, is 1. It is halfway between both if sizes are unknown, lie on
-    one side, or nothing is left of the swing beyond. If the limit is outside the range, the end of the range stands for
-    it.
+    one side, or nothing is left of the swing beyond. If the limit is outside the range, it is the end of the range.
     """
     last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
     after = np.minimum(last + 1, len(values) - 1)
@@ -59,23 +59,25 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
 
 
 def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """Return the values below which no run keeps moving; the counterpart of `ends`."""
+    """Return the values below which no run keeps moving; see `ends`."""
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
 
 def limit_error(values: np.ndarray, limits: int = 1) -> float:
-    """Return the error of a limit along `values`, or of the mean of several `limits`: a limit may lie anywhere between
-    two neighbouring values (95 %)."""
+    """Return the error of a limit along `values`, or of the mean of several `limits`.
+
+    A limit may lie anywhere between two neighbouring values (95 %).
+    """
     step = float(np.diff(values).max())
     return min(step / 2, step / (3 * limits) ** 0.5)
 
 
 GONE = 1e-3
-"""Swing relative to the least that counts, below which no swing is left."""
+"""Swing, over the least that counts, below which no swing is left."""
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation of the known pairs.
+    """Return Spearman's rank correlation of the pairs that are known.
 
     It is NaN for fewer than three pairs, or if one side is constant.
     """
@@ -87,14 +89,14 @@ def trend(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def trend_text(correlation: float) -> str:
-    """Return a rank correlation in words: where `trend` has none, that it is undefined."""
+    """Return a rank correlation in words; for NaN, say that it is undefined."""
     return f"{correlation:.2f}" if np.isfinite(correlation) else "undefined (too few cells, or all equal)"
 
 
 def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
     """Return the fraction of valid cells in the largest square of cells that come to rest."""
     free = valid & ~moving
-    side = free.astype(int)  # of the largest free square whose last corner is the cell
+    side = free.astype(int)  # size of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
         for j in range(1, side.shape[1]):
             if free[i, j]:
@@ -103,7 +105,7 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
 
 
 def overlap(part: np.ndarray, total: np.ndarray) -> float:
-    """Return the fraction of the cells of `total` that are in `part` too; NaN for an empty `total`."""
+    """Return the fraction of the cells of `total` that are also in `part`; NaN for an empty `total`."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 

@@ -1,5 +1,8 @@
-"""The claims over the plausible space: in how many joint draws of the unstated values each holds, on which of them that
-hangs, and which draw fits the printed numbers best."""
+"""Judge the claims over joint draws of the values that the thesis does not state.
+
+The module finds in how many draws each claim holds, on which values that depends, and which draw fits the printed
+numbers best.
+"""
 
 from __future__ import annotations
 
@@ -23,21 +26,20 @@ from friso_thesis.studies.thesis.studies import STUDIES
 from friso_thesis.studies.thesis.ways import by_peak_count, by_way
 
 DRAWS, EVERY = 48, 3
-"""Default number of joint draws, and interval between draws with linear analysis and experiments.
-
-Analysis and experiments take longer than all maps."""
+"""Default number of joint draws, and interval between draws with linear analysis and experiments, which take longer
+than all maps."""
 
 POINTS = 21
-"""Values per axis of the maps of a draw, whatever those of the baseline; limits are interpolated."""
+"""Values per axis of the maps of a draw, whatever the baseline has. Limits are interpolated."""
 
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
 
 MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
-"""Steps of progress for the maps of a draw, and for its linear analysis and experiments."""
+"""Progress steps for the maps of a draw, and for its linear analysis and experiments."""
 
 DOUBT = 0.05
-"""Probability of a chance separation above which it is not reported, over all values of a claim together."""
+"""Probability of a chance separation above which it is not reported, for all values of a claim together."""
 
 PARTS = {**NEEDS, **EXPERIMENTS}
 """Parts of the evidence besides maps and responses."""
@@ -47,8 +49,8 @@ PARTS = {**NEEDS, **EXPERIMENTS}
 class Separation:
     """How well a value separates the draws in which a claim holds from the others.
 
-    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1), 1 if the claim holds at all the
-    larger values, with its probability by chance.
+    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if the claim holds at all the
+    larger values. `probability` is that of such a correlation by chance.
     """
 
     value: str
@@ -58,7 +60,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """A part of a claim: the number of draws in which it is `met`, and their fraction of all draws, `share`."""
+    """A part of a claim over draws: the number of draws in which it is `met`, and their fraction."""
 
     met: int
     share: Share
@@ -68,9 +70,9 @@ class MetPart:
 class ClaimInSpace:
     """A claim over joint draws.
 
-    `seeds` (seed, number) are those of the draws. `holds` is the fraction of them in which it holds, `parts` those in
-    which each part does. `hangs_on` are the values on which that depends, the most decisive first. `failures` say, by
-    the number of the draw, why it could not be computed.
+    `seeds` (seed, number) are those of the draws. `holds` is the fraction of draws in which the claim holds, and
+    `parts` tell the same for each part. `hangs_on` are the values on which that depends, the most decisive first.
+    `failures` say, by the number of the draw, why it could not be computed.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -112,9 +114,12 @@ class PrintedNumber:
 
 @dataclass(frozen=True)
 class BestFit:
-    """The draw whose numbers are nearest to those printed, friso's own choice (numbered -1) being one of them: the root
-    mean square of the logarithms of their ratios (`misfit`; at friso's choice: `at_baseline`), all on maps of `POINTS`
-    values per axis, and these numbers."""
+    """The draw whose numbers are nearest to the printed ones.
+
+    friso's own choice counts as one draw, numbered -1. `misfit` is the root mean square of the logarithms of the
+    ratios, and `at_baseline` that of friso's choice. All are on maps of `POINTS` values per axis. `numbers` are the
+    numbers compared.
+    """
 
     draw: Draw
     misfit: float
@@ -124,10 +129,10 @@ class BestFit:
 
 @dataclass(frozen=True)
 class Plausible:
-    """All claims over the space of draws, by their name.
+    """All claims over the joint draws, by name.
 
-    It has the best fit (None without draws), and the findings at friso's `own` choice, on maps of `POINTS` values per
-    axis.
+    There are the best fit (None without draws), and the findings at friso's `own` choice, on maps of `POINTS` values
+    per axis.
     """
 
     draws: tuple[Draw, ...]
@@ -142,8 +147,10 @@ def plausible(
     kept: Kept = NOT_KEPT,
     tally: Tally | None = None,
 ) -> Plausible:
-    """Return the claims over so many joint draws; friso's own choice is computed as one more,
-    for the best fit."""
+    """Judge the claims over `draws` joint draws.
+
+    friso's own choice is computed as one more, for the best fit.
+    """
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
     drawn = tuple(draw(number) for number in range(draws))
@@ -177,7 +184,7 @@ def plausible(
 
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
-    """Return the amount of work for `draws` random rigs, in the units of the progress tally."""
+    """Return the amount of work for `draws` random rigs, in units of the progress tally."""
     cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
     costly = any(entry.needs & PARTS.keys() for entry in entries.values())
     return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
@@ -189,7 +196,10 @@ def counted(entry: Registered, base: Evidence) -> Finding:
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """Return the findings in a draw by claim; of what cannot be computed there, why not."""
+    """Judge the claims in one draw.
+
+    A claim that cannot be computed there gets the reason.
+    """
     needs = {need for entry in entries.values() for need in entry.needs}
     try:
         base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
@@ -205,17 +215,16 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
 
 
 def _failure(error: Exception) -> Finding:
-    """Return what stands for a claim that is undecided in a draw."""
+    """Return the finding for a claim that is undecided in a draw because of an error."""
     return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
 
 
 FAILED = "failed"
-"""Suffix of the name of a claim that cannot be computed."""
+"""Suffix of the name of a claim that could not be computed."""
 
 _SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
-"""Errors that mean that an experiment on a drawn rig shows nothing, such as a loop that stops.
-
-Errors of the program are of other types."""
+"""Errors that mean that an experiment on a drawn rig shows nothing, such as a loop that stops. Errors of the program
+are of other types."""
 
 
 def _in_space(
@@ -235,13 +244,16 @@ def _in_space(
 
 
 def _met(column: Sequence[bool | None], count: int) -> MetPart:
-    """Return in how many of `count` draws a part is met; in others it is undecided."""
+    """Return in how many of `count` draws a part is met; in the others it is undecided."""
     flags = np.array([holds for holds in column if holds is not None], bool)
     return MetPart(int(flags.sum()), _share(flags, count))
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """Return the fraction of `count` draws, those beyond the flags being undecided."""
+    """Return the fraction of `count` draws.
+
+    Draws without a flag count as undecided.
+    """
     missing = count - len(flags)
     return share(
         np.append(flags, np.zeros(missing, bool)), np.append(np.ones(len(flags), bool), np.zeros(missing, bool))
@@ -249,8 +261,10 @@ def _share(flags: np.ndarray, count: int) -> Share:
 
 
 def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:
-    """Yield the values that separate the draws more than by chance (Mann and Whitney,
-    with Bonferroni's correction)."""
+    """Yield the values that separate the draws by more than chance.
+
+    The test is Mann and Whitney's, with Bonferroni's correction.
+    """
     from scipy.stats import mannwhitneyu  # 0.7 s to import
 
     if holds.all() or not holds.any():
@@ -270,8 +284,10 @@ def _fit(
     by_claim_tried: Mapping[str, Sequence[tuple[Draw, Finding | None]]],
     own: Mapping[str, Finding],
 ) -> BestFit | None:
-    """Return the draw, or friso's `own` choice, that fits the printed numbers best,
-    by the thesis's own count; one of which not all of them are known is none."""
+    """Return the draw, or friso's `own` choice, that fits the printed numbers best, by the count.
+
+    A draw of which a number is unknown is left out.
+    """
     first = baseline()
     at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]
     by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
@@ -291,7 +307,7 @@ def _fit(
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
-    """Return the printed numbers of a claim with what was found of them."""
+    """Return the printed numbers of a claim, with the numbers found."""
     return [
         PrintedNumber(claim, part.criterion, part.printed, part.read)
         for part in finding.parts

@@ -1,5 +1,7 @@
-"""Turn the words of the thesis into numbers: “about”, “far”, “few”, “the same”, “trend”,
-“large”, and other readings."""
+"""Turn the words of the thesis into numbers.
+
+They are “about”, “far”, “few”, “the same”, “trend”, “large”, and other words.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +50,7 @@ class WordReading:
 
 
 OWN = WordReading()
-"""The reading of words that friso uses."""
+"""The reading of words that friso uses by default."""
 
 _READ: ContextVar[WordReading] = ContextVar("reading", default=OWN)
 
@@ -60,7 +62,7 @@ def reading() -> WordReading:
 
 @contextmanager
 def read_as(other: WordReading) -> Iterator[None]:
-    """Judge by another reading within."""
+    """Judge by another reading within the block."""
     before = _READ.set(other)
     try:
         yield
@@ -70,8 +72,10 @@ def read_as(other: WordReading) -> Iterator[None]:
 
 @contextmanager
 def words_read() -> Iterator[set[str]]:
-    """Return the words that are read within: what is judged there is the same by any other
-    reading of all others."""
+    """Record the words that are read within the block.
+
+    Judgements there do not depend on the reading of any other word.
+    """
     noted = _NotedReading(reading())
     with read_as(cast("WordReading", noted)):
         yield noted.words
@@ -127,11 +131,11 @@ def _otherwise() -> dict[str, WordReading]:
 
 
 OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
-"""Other reasonable readings, by the change: each differs in one word, upward or downward."""
+"""Other reasonable readings, by the change. Each differs in one word, upward or downward."""
 
 
 def others_of(words: Set[str]) -> dict[str, WordReading]:
-    """Return those that read one of these words otherwise."""
+    """Return the other readings that differ in one of these words."""
     return {
         name: other
         for name, other in OTHERWISE.items()
@@ -140,8 +144,10 @@ def others_of(words: Set[str]) -> dict[str, WordReading]:
 
 
 def about(value: float, expected: float, factor: float | None = None) -> bool:
-    """Tell whether a positive number is within a factor (by default that of “about”) of what is
-    expected; NaN is not."""
+    """Tell whether a positive number is within a factor of what is expected; NaN is not.
+
+    By default it is the factor of “about”.
+    """
     within = reading().about if factor is None else factor
     return expected / within <= value <= expected * within
 
@@ -162,4 +168,4 @@ CONVENTIONS = (
     "what counts, or halfway where nothing is left of it; none beyond it keeps moving. A criterion whose number lies "
     "beside its threshold within its error is undecided, and so is one that no simulation can decide; neither counts."
 )
-"""Note on the reading of words that all criteria have in common."""
+"""Note on the reading of words that all criteria share."""

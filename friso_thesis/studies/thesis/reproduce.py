@@ -1,4 +1,4 @@
-"""The reproduction of the thesis: every study and response, every claim judged, and what each judgement hangs on."""
+"""Reproduce the thesis: run every study and response, judge every claim, and find what it depends on."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 POINTS, MOST_POINTS = 41, 1001
-"""Default and largest number of values per axis: 0.4 Hz apart in Fig. 16, and a million cells per map."""
+"""Default and largest number of values per axis. The default gives 0.4 Hz steps in Fig. 16, the largest a million cells
+per map."""
 
 JUDGED = 21
-"""Smallest number of values per axis of maps on which claims are judged.
-
-Coarser maps miss regions between two values, and "few" or a trend has no meaning on a handful of cells."""
+"""Smallest number of values per axis of maps on which claims are judged. Coarser maps miss regions between two values,
+and "few" or a trend has no meaning on a handful of cells."""
 
 MOST_DRAWS = 10_000
 
@@ -52,10 +52,8 @@ SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
 PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
-"""Steps of progress, in units of a run's processor time.
-
-They are those of a part of the linear analysis or an experiment, and of the survey of a map with the joint locked and
-free."""
+"""Progress steps, in units of a run's processor time: for a part of the linear analysis or an experiment, and for the
+survey of a map with the joint locked and free."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +98,14 @@ def reproduce(
     only: Iterable[str] | None = None,
     kept: Kept = NOT_KEPT,
 ) -> Reproduction:
-    """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims, or `only`
-    some of them, with what these need, on maps of at least `JUDGED` values per axis.
+    """Run the studies `names` (default: all of Table 3), and judge the claims.
 
-    A claim that is left out is "not yet covered". `with_cycles` the hunting cycles behind every map are computed too,
-    and what attracts is told beside each judgement; with `draws` every claim is judged in as many joint draws of the
-    values that the thesis leaves open. What is `kept` of an earlier run is not computed again. `progress` is called
-    with steps done, steps in all and what comes next. Raises InputError for an unknown study or claim and for numbers
-    that are too low or too high, ValueError for an unusable rtol.
+    Maps have `points` values per axis, and for judging at least `JUDGED`. With `only`, just these claims are judged,
+    with what they need; a claim that is left out is "not yet covered". `with_cycles` also computes the hunting cycles
+    behind every map, and adds to each judgement what attracts the stages. With `draws`, every claim is judged in as
+    many joint draws of the values that the thesis leaves open. What is `kept` of an earlier run is not computed again.
+    `progress` is called with steps done, steps in all and what comes next. Raises InputError for an unknown study or
+    claim and for numbers that are too low or too high, ValueError for an unusable rtol.
     """
     chosen, asked = _studies(names), _claims(only)
     _check("points", points, 3, MOST_POINTS, "41")
@@ -188,7 +186,7 @@ def reproduce(
 
 
 def _survey_work(study: ThesisStudy) -> int:
-    """Return the steps of progress that the survey of a map takes."""
+    """Return the progress steps that the survey of a map takes."""
     return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
 
 
@@ -204,8 +202,10 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
 def _by_attraction(
     entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], cycles: Mapping[str, CyclesOnMap]
 ) -> Finding | None:
-    """Return the finding by what attracts the stages; None for a claim without maps, for one on runs, and for one on
-    paths alone, on which what attracts does not depend."""
+    """Return the finding by what attracts the stages, or None.
+
+    It is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not depend.
+    """
     maps = entry.needs & STUDIES.keys()
     if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
         return None
@@ -215,8 +215,10 @@ def _by_attraction(
 
 
 def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[str, Finding]:
-    """Return the findings by other readings of the `words` of the thesis by which the claim is
-    judged, by what is read otherwise."""
+    """Return the findings by other readings of the thesis's `words`.
+
+    Only words by which the claim is judged are read otherwise. The result is by the change of reading.
+    """
     findings = {}
     for name, other in others_of(words).items():
         with read_as(other):
@@ -246,15 +248,17 @@ def _others(
 
 
 def _second(runs: xr.Dataset) -> xr.Dataset:
-    """Return every second value of each axis; of fewer than five values, all."""
+    """Return every second value of each axis; for fewer than five values, all."""
     return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
 
 
 def _needs(
     entries: Mapping[str, Registered], chosen: Mapping[str, ThesisStudy], asked: frozenset[str] | None
 ) -> set[str]:
-    """Return what is computed: what the claims need,
-    and all studies and responses where none is asked for by name."""
+    """Return what must be computed: what the claims need.
+
+    Without named studies, all studies and responses are added.
+    """
     needs = {need for entry in entries.values() for need in entry.needs}
     return needs if asked is not None else needs | chosen.keys() | RESPONSES.keys() | NEEDS.keys()
 
@@ -280,7 +284,7 @@ def _studies(names: Iterable[str] | None) -> dict[str, ThesisStudy]:
 
 
 def _claims(only: Iterable[str] | None) -> frozenset[str] | None:
-    """Return the claims asked for, whatever their case; all where none is."""
+    """Return the claims requested, in any spelling of case; all if none is."""
     if only is None:
         return None
     ids = {claim.id.upper(): claim.id for claim in claims()}

@@ -1,4 +1,4 @@
-"""Settings of the judges of the thesis's sentences."""
+"""Settings of the judges of the thesis's claims."""
 
 from __future__ import annotations
 
@@ -9,25 +9,27 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class JudgeSettings(Settings):
-    """What judges take for far, for equal, and how many stages they draw."""
+    """Settings of judges: thresholds in words of the thesis, and numbers of draws."""
 
     influence_draws: int = setting(1024, "stages")
-    """A rank correlation over so many is known to 0.06, two standard errors."""
+    """Number of stages drawn for a rank correlation, whose two standard errors are then 0.06."""
 
     influence_rtol: float = setting(1e-5, "")
-    """Ten times tighter than the thesis's tolerance; tighter runs count the same peaks."""
+    """Relative tolerance of runs for the correlations, ten times tighter than the thesis's. Tighter runs count the same
+    peaks."""
 
     far_crossover_factor: float = setting(3.0, "")
-    """“Significantly larger” or “smaller” than an eigenfrequency: half a decade, as “far” in all claims."""
+    """Factor of “significantly larger” or “smaller” than an eigenfrequency: half a decade, as “far” in all claims."""
 
     tuned_masses: int = setting(9, "")
-    """Masses for which the controller is tuned, from that of the stage to the whole: more show the same maximum."""
+    """Number of masses for which the controller is tuned, from the stage's to the whole mass. More show the same
+    maximum."""
 
     leaf_change_factor: float = setting(1.1, "")
-    """Factor by which a dimension of the leaves grows: small enough that stiffnesses change in proportion."""
+    """Factor by which a dimension of the leaves grows, small enough for stiffnesses to change in proportion."""
 
     negligible_share: float = setting(0.01, "")
-    """Share up to which a spring is linear and a motion of no account; one reads no less off a figure."""
+    """Largest share that is negligible, for a nonlinearity or a motion. Smaller ones cannot be read off a figure."""
 
     exact_share: float = setting(1e-9, "")
-    """Numbers that follow from one equation differ by rounding alone, which is far less."""
+    """Largest relative difference between numbers that follow from one equation. Rounding is far smaller."""

@@ -1,4 +1,4 @@
-"""The values that the thesis does not state, over the ranges in which they are plausible, and joint draws of them."""
+"""Define the values that the thesis does not state, with plausible ranges, and draw them jointly."""
 
 from __future__ import annotations
 
@@ -18,16 +18,18 @@ if TYPE_CHECKING:
 LIMITER_PULLS = "joint.limiter_pulls"
 
 SEED = 1
-"""Seed of the draws; seed and number determine a draw, whatever the total number."""
+"""Seed of the draws. Seed and number determine a draw, whatever the total number."""
 
 _OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
 
 
 @dataclass(frozen=True)
 class OpenValue:
-    """A value that the thesis leaves open: from `low` to `high` [unit], drawn evenly, in its logarithm or as one of the
-    two ends (`scale`); the keys of the stage file on which it decides, why it may be anywhere there, and friso's own
-    choice (`baseline`)."""
+    """A value that the thesis leaves open, from `low` to `high` [unit].
+
+    `scale` tells how it is drawn: evenly, in its logarithm, or as one of the two ends. It has the keys of the stage
+    file that it sets, why it may lie anywhere in the range, and friso's own choice (`baseline`).
+    """
 
     name: str
     low: float
@@ -47,16 +49,18 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Tell whether the study's map can be another with another value."""
+        """Tell whether another value may change the study's map."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:
-        """Tell whether it matters where the keys `fixed` are decided on otherwise;
-        a locked joint has no damping of its own."""
+        """Tell whether the value matters if the keys `fixed` are set by something else.
+
+        A locked joint has no damping of its own.
+        """
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether that part of the linear analysis, or that experiment, can be another."""
+        """Tell whether another value may change that part of the linear analysis, or that experiment."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 
@@ -123,7 +127,10 @@ OPEN: tuple[OpenValue, ...] = (
 
 
 def draw_name(number: int) -> str:
-    """Return what a draw is called; people count from 1, seeds from 0."""
+    """Return the name of a draw.
+
+    Names count from 1, seeds from 0.
+    """
     return f"draw {number + 1}"
 
 
@@ -140,7 +147,7 @@ class Draw:
 
     @property
     def changes(self) -> dict[str, Any]:
-        """Return what it changes in the stage file of the rig."""
+        """Return the changes of the draw in the stage file of the rig."""
         v = self.values
         ratio, mass = v["cruise over acceleration time"], v["mass"]
         time = np.sqrt(v["distance"] / (v["acceleration"] * (1 + ratio)))
@@ -165,8 +172,10 @@ class Draw:
 
 
 def draw(number: int) -> Draw:
-    """Return the joint draw of this number, from 0 on: values independent of each other,
-    and of other draws."""
+    """Return the joint draw with a number, from 0 on.
+
+    Its values are independent of each other, and of other draws.
+    """
     shares = np.random.default_rng([SEED, number]).random(len(OPEN))
     return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})
 
@@ -178,8 +187,10 @@ def baseline() -> Draw:
 
 def enters(value: OpenValue, needs: frozenset[str], responses: Mapping[str, Mapping[str, object]],
            parts: Mapping[str, PartNeeded]) -> bool:  # fmt: skip
-    """Tell whether a value can change anything of what a judge `needs`: maps,
-    `responses` by what they change in the rig, or `parts` of the analysis."""
+    """Tell whether a value can change anything that a judge `needs`.
+
+    Needs are maps, `responses` by what they change in the rig, and `parts` of the analysis.
+    """
     for name in needs:
         if name in STUDIES:
             touched = value.touches(STUDIES[name])

@@ -1,4 +1,4 @@
-"""The ten studies of the thesis's Table 3, as data: the ranges as printed, zeros included."""
+"""Define the ten studies of the thesis's Table 3 as data: the ranges as printed, including zeros."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class AxisSpan:
-    """The range of one axis: the stage-file key (or free name), its ends [unit], and whether it is logarithmic."""
+    """Range of one axis: the stage-file key (or free name), its ends [unit], and if it is logarithmic."""
 
     key: str
     low: float
@@ -26,17 +26,17 @@ class AxisSpan:
     log: bool = False
 
     def text(self, points: int) -> str:
-        """Return the range as `friso.sweep` reads it, `points` values with both ends."""
+        """Return the range as `friso.sweep` reads it, with `points` values including both ends."""
         ends = "..".join(f"{end!r} {self.unit}".rstrip() for end in (self.low, self.high))
         return f"{ends}:{points}:{'log' if self.log else 'linear'}"
 
 
 @dataclass(frozen=True)
 class ThesisStudy:
-    """One row pair of Table 3.
+    """A study: a pair of rows of Table 3.
 
-    `panel` is the figure that shows it, such as "11A"; `changes` make its stage out of the rig of Table 2 and
-    Sec. 3.5; `spans` are its two axes and `links` what follows them; `marker` is the evaluation point of the other
+    `panel` is the figure that shows it, such as "11A". `changes` make its stage out of the rig of Table 2 and Sec. 3.5;
+    `spans` are its two axes and `links` the keys that follow them. `marker` is the evaluation point of the other
     studies, SI values by axis. `zeros` says what a zero of its ranges means.
     """
 
@@ -51,13 +51,12 @@ class ThesisStudy:
 
     @property
     def sets(self) -> frozenset[str]:
-        """Return the keys that the study itself decides on."""
+        """Return the keys that the study itself sets."""
         return frozenset(span.key for span in self.spans) | frozenset(self.links) | frozenset(self.changes)
 
     @property
     def of_motion(self) -> bool:
-        """Tell whether its axes are those of the motion alone,
-        on which what attracts does not depend."""
+        """Tell whether its axes belong to the motion alone, on which attractors do not depend."""
         return all(span.key.startswith("motion.") for span in self.spans)
 
     def axes(self, points: int) -> dict[str, str]:
@@ -71,7 +70,7 @@ class ThesisStudy:
 
 @cache
 def thesis_rig() -> Stage:
-    """Return the rig of Table 2 and Sec. 3.5 with our choice of what the thesis leaves open."""
+    """Return the rig of Table 2 and Sec. 3.5, with our choice of what the thesis leaves open."""
     return loads(files("friso_thesis.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8"))
 
 
@@ -90,8 +89,10 @@ def rig_gains(mass: float) -> tuple[float, float, float]:
 
 
 def masses(whole: float) -> dict[str, object]:
-    """Return the masses that make a whole [kg], in the proportions weighed,
-    and the controller tuned for it."""
+    """Return masses that add up to `whole` [kg], in the weighed proportions.
+
+    The controller is tuned for the whole mass.
+    """
     shares = {"masses.cart": 1.2, "masses.stage": 0.5, "parasitic.mass": 0.25, TUNED_MASS: 1.7}
     return {key: f"{whole * share / 1.7!r} kg" for key, share in shares.items()}
 
@@ -110,7 +111,7 @@ _STROKE_ZERO = "Stroke 0: the joint always rests on its limiter, k_j + k_l."
 _CROSSOVER = (AxisSpan(CROSSOVER, 1.0, 16.0, "Hz"), _STROKE)
 _CROSSOVER_MARKER = {CROSSOVER: 8.0, "joint.stroke": 1e-3}
 
-# The mass of the rig, 1.7 kg, is 1.2 kg of cart and 0.5 kg of stage, half of which is the parasitic mode's: kept.
+# The rig's 1.7 kg are 1.2 kg of cart and 0.5 kg of stage, half of it the parasitic mode's: this ratio is kept.
 _SAME_SHARES = {
     "masses.cart": "mass*1.2/1.7",
     "masses.stage": "mass*0.5/1.7",
@@ -195,6 +196,5 @@ _ALL = (
 )
 
 STUDIES: Mapping[str, ThesisStudy] = MappingProxyType({study.name: study for study in _ALL})
-"""The studies of Table 3 by name, in the order of the figures.
-
-The last, of the softer joint, belongs to Fig. 16 alone."""
+"""The studies of Table 3 by name, in the order of the figures. The last one, with the softer joint, belongs to Fig. 16
+alone."""

@@ -1,4 +1,4 @@
-"""Results as arrays and one text, and back: what is kept of an experiment."""
+"""Convert results to arrays and one text, and back, to save experiments."""
 
 from __future__ import annotations
 
@@ -40,8 +40,10 @@ def _tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
 
 
 def put_together(kind: type[T], arrays: Mapping[str, np.ndarray]) -> T:
-    """Return the result of a kind whose annotations tell what its parts are. Raises ValueError,
-    TypeError, KeyError or RecursionError for arrays that are not of it."""
+    """Build a result of a kind, whose annotations define its parts, from arrays.
+
+    Raises ValueError, TypeError, KeyError or RecursionError for arrays that do not belong to it.
+    """
     return cast("T", _value(kind, json.loads(str(arrays[_TREE])), arrays))
 
 
@@ -62,7 +64,7 @@ def _value(kind: Any, tree: Any, arrays: Mapping[str, np.ndarray]) -> Any:
         return tuple(_value(part, item, arrays) for part, item in zip(kinds, tree, strict=True))
     if origin in (UnionType, Union):
         return None if tree is None else _value(next(part for part in parts if part is not NoneType), tree, arrays)
-    if origin is not None:  # the one other kind is a mapping
+    if origin is not None:  # a mapping is the only other kind
         return {_value(parts[0], key, arrays): _value(parts[1], item, arrays) for key, item in tree}
     if not isinstance(tree, _SCALARS):
         raise TypeError(f"{kind}: expected a number or a text, got {type(tree).__name__}")

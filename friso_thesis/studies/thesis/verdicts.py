@@ -1,4 +1,4 @@
-"""From findings to the verdict on a claim: the judgement, the reason found, and what it depends on."""
+"""Derive the verdict on a claim from findings: judgement, reason, and what it depends on."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from friso_thesis.studies.thesis.plausible import ClaimInSpace
 from friso_thesis.studies.thesis.space import OPEN
 
 ROBUST = 0.25
-"""Largest fraction of the space in which a claim may hold while its contradiction is called robust.
-
-Thirteen draws in which it does not hold show that."""
+"""Largest fraction of the space in which a claim may hold while its contradiction counts as robust. Thirteen draws in
+which it does not hold show that."""
 
 NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
@@ -45,7 +44,7 @@ class ClaimVerdict:
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement at friso's own choice of what the thesis leaves open, and over the joint draws of it.
+        """Return the judgement at friso's own choice of open values, and over their joint draws.
 
         A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
         open if it holds at friso's choice or in some draw, but not so often.
@@ -61,9 +60,10 @@ class ClaimVerdict:
 
     @property
     def robust(self) -> bool:
-        """Tell whether no plausible choice of what the thesis leaves open makes a claim hold that does not.
+        """Tell whether a claim fails for any plausible choice of what the thesis leaves open.
 
-        It holds in no draw, its fraction is at most `ROBUST` by its interval, and nothing undrawn decides on it.
+        It does if it holds in no draw, its fraction is at most `ROBUST` by its interval, and nothing undrawn decides on
+        it.
         """
         fails = self.judgement in ("holds in part", "differs")
         return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
@@ -93,7 +93,10 @@ class ClaimVerdict:
 
     @property
     def depends_on(self) -> str:
-        """Return the values that decide whether it holds, the most decisive first; "" if none stands out."""
+        """Return the values that decide whether the claim holds, the most decisive first.
+
+        The result is "" if none stands out.
+        """
         return ", ".join(item.value for item in self.space.hangs_on) if self.space else ""
 
     def _word_of(self, finding: Finding) -> str:
@@ -108,7 +111,7 @@ def draws_text(share: Share, count: int, draws: int) -> str:
 
 
 def _listed(space: ClaimInSpace) -> str:
-    """Return the values on which a claim hangs, the most decisive first."""
+    """Return the values on which a claim depends, the most decisive first."""
     either = {value.name: value for value in OPEN}
     words = []
     for item in space.hangs_on:
@@ -119,7 +122,7 @@ def _listed(space: ClaimInSpace) -> str:
 
 
 def not_covered(claim: Claim, reason: str) -> ClaimVerdict:
-    """Return a claim with no judge, or without what its judge needs."""
+    """Return the verdict "not covered" on a claim, for lack of a judge or of evidence."""
     return ClaimVerdict(claim, "", None, reason)
 
 
@@ -133,7 +136,7 @@ def verdict(
     undrawn: str = "",
     readings: Mapping[str, Finding] = NO_FINDINGS,
 ) -> ClaimVerdict:
-    """Return the verdict from the finding by the thesis's count, and that by what attracts.
+    """Return the verdict from findings by the thesis's count and by what attracts the stages.
 
     `others` are findings by another method, by its name. `readings` are findings by another reading of the words. Both
     are mentioned if other parts of the claim hold there.
@@ -152,7 +155,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Return how a finding is judged otherwise, with the numbers of the parts that turned."""
+    """Say how another finding is judged, with the numbers of the parts that differ."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

@@ -1,5 +1,7 @@
-"""The two ways in which a stage is said to hunt: the thesis's count of peaks, which judges its claims, and whether a
-cycle attracts the stage, which stands beside the judgement."""
+"""Apply the two criteria by which a stage is said to hunt.
+
+The thesis's count of peaks judges its claims. Whether a cycle attracts the stage is stated beside the judgement.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 COUNT, CYCLE = "the thesis's count", "an attracting cycle"
-"""Names of the two ways to judge hunting: counted peaks (plain `findpeaks`, Sec. 3.2.2), and an attracting cycle,
+"""Names of the two criteria of hunting: counted peaks (plain `findpeaks`, Sec. 3.2.2), and an attracting cycle,
 whatever the move."""
 
 
@@ -25,7 +27,7 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
     """Return the runs with the numbers that judges read, by the thesis's count.
 
     They are whether at least one peak is counted, the count, the final swing over the height from which peaks count,
-    and whether the stage hunts for good (`lasts`): here, whether the run swings at its end.
+    and whether the stage hunts for good (`lasts`): with this criterion, whether the run swings at its end.
     """
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),
@@ -36,12 +38,11 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
 
 
 def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, apart: np.ndarray) -> xr.Dataset:
-    """Return the runs with the numbers that judges read,
-    by whether something attracts the stage of each cell.
+    """Return the runs with the numbers that judges read, by attraction in each cell.
 
     The arrays have the runs' shape; uncertain cells are left out. A stage with an attractor also `lasts`. How often a
     cycle repeats in a run is known only if the move ended in it. `apart` are the distances of the cells from the curves
-    on which cycles stop attracting, in cells: limits are interpolated by them.
+    on which cycles stop attracting, in cells; limits are interpolated by them.
     """
     moving = runs["keeps_moving"].copy(data=attracts & decided).assign_attrs(criterion="a cycle attracts the stage")
     outcome = runs["outcome"].where(runs["keeps_moving"].copy(data=decided) | (runs["outcome"] == "invalid"), FAILED)
@@ -51,6 +52,6 @@ def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, a
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:
-    """Return the evidence with its maps and responses read in one way."""
+    """Return the evidence with its maps and responses read by one criterion."""
     responses = {name: Response(read(item.cell), item.trace) for name, item in evidence.responses.items()}
     return replace(evidence, maps={name: read(runs) for name, runs in evidence.maps.items()}, responses=responses)

@@ -15,5 +15,5 @@ if TYPE_CHECKING:  # the names are asked for by --help
 RIG_EXPERIMENTS: Registry[Callable[[Stage, int, Progress], Outcome]] = Registry(
     "friso.studies.rig.experiments", "run_experiment", "friso.rig_experiments"
 )
-"""All experiments of the rig; every module of this folder, and every module named by an installed package, declares the
-function that runs it on a stage with a seed."""
+"""All experiments of the rig. Every module of this folder, and every module named by an installed package, declares the
+function that runs its experiment on a stage with a seed."""

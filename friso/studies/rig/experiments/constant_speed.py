@@ -22,15 +22,15 @@ from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 
 DURATIONS = (480.0, 120.0)
-"""Duration of the way in periods of the crossover: 2.5 and 10 mm/s on the thesis's rig."""
+"""Durations of the two passes in periods of the crossover. On the thesis's rig they give 2.5 and 10 mm/s."""
 
 
 @dataclass(frozen=True)
 class Passes:
     """Results of passes at constant speed, with the joint as in `name`.
 
-    They are friction over place and over velocity. The true mean dynamic friction at the two speeds over the way [N]
-    has the shape (2,).
+    They are friction over place and friction over velocity. `true` is the true mean dynamic friction [N] over the way
+    at the two speeds, shape (2,).
     """
 
     name: str
@@ -44,8 +44,8 @@ class Passes:
 class ConstantSpeedResult:
     """Results of the experiment at constant speed.
 
-    They are the two speeds [m/s] of the thesis, the passes at these with the joint free and locked, and the passes at
-    many speeds. Slow sliding is added, except where friction has no bristles.
+    `speeds` [m/s] are the two speeds of the thesis, `cases` the passes at these speeds with the joint free and locked,
+    `many` the passes at many speeds, and `slow` the slow sliding, empty if friction has no bristles.
     """
 
     speeds: tuple[float, ...]
@@ -90,7 +90,7 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
 
 
 def passes_log(name: str, stage: Stage, seed: int) -> RigLog:
-    """Return the log of passes there and back at both speeds; `name` says if the joint is free."""
+    """Return the log of passes to and fro at both speeds; `name` says whether the joint is free."""
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):

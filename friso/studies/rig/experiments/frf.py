@@ -31,20 +31,20 @@ RATIOS = (1.0, 0.68, 1.47)
 """Ratios of true to assumed motor constant that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
 
 BESIDE = 3.0
-"""Distance of the free joint's mass line from its first mode and from the parasitic one, as factors of frequency."""
+"""Distance of the free joint's mass line from its first mode, and from the parasitic mode, as factors of frequency."""
 
 FASTER, STEPS = 1.1, 33
-"""Factor between successive settings tried for stability, from a third of the highest of `SETTINGS` on, and their
-number."""
+"""Factor between successive settings that are tried for stability, and their number. They begin at a third of the
+highest of `SETTINGS`."""
 
 RELEASED, WAIT = 0.01, 8.0
-"""Release of the free stage in strokes off its reference, and duration in periods of the stage's crossover. A loop with
-a larger error in the last quarter is not stable."""
+"""Distance of the free stage from its reference at release, in strokes, and duration in periods of the stage's
+crossover. A loop with a larger error in the last quarter is not stable."""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """The plant as identified: single identifications, and the combination.
+    """The plant as identified: each identification, and their combination.
 
     It has the frequency [Hz] of the first mode of a free joint (NaN: locked), and the mass line with its frequency
     range [Hz].
@@ -59,7 +59,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """An open loop tuned to a crossover [Hz], and its true crossing of 0 dB [Hz].
+    """An open loop tuned to a crossover [Hz], and the frequency [Hz] at which it really crosses 0 dB.
 
     It has no lines if the closed loop was not stable.
     """
@@ -78,8 +78,8 @@ class MeasuredLoop:
 class Frf:
     """Results of the frequency-response experiment.
 
-    They are the plants, the open loops locked at several settings and free, and apparent masses [kg], shape (2,
-    ratios), locked and free, for the motor constants of `RATIOS`. With the joint free there are the tried settings
+    They are the plants, the open loops, locked at several settings and free, and apparent masses [kg], shape (2,
+    ratios), locked and free, for the motor constants of `RATIOS`. For the free joint there are also the tried settings
     [Hz], shape (STEPS,), and which of them were stable.
     """
 
@@ -93,21 +93,21 @@ class Frf:
 
     @property
     def highest_stable(self) -> float:
-        """Return the last setting [Hz] before the first that is not stable; NaN if the first is not."""
+        """Return the highest setting [Hz] below the first unstable one; NaN if the first is unstable."""
         return highest_stable(self.settings, self.stable)
 
 
 def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
     """Return the last of rising settings before the first unstable one, both (n,).
 
-    NaN if the first one is unstable.
+    It is NaN if the first one is unstable.
     """
     first = len(stable) if stable.all() else int(np.argmin(stable))
     return float(settings[first - 1]) if first else np.nan
 
 
 def crossing_near_target(loop: MeasuredLoop) -> float:
-    """Return the crossing of 0 dB [Hz] nearest to the tuned one; NaN without any."""
+    """Return the 0 dB crossing [Hz] nearest to the crossover that the loop is tuned for; NaN for none."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 
@@ -174,7 +174,7 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
 
 
 def locked_plant(logs: list[RigLog]) -> Plant:
-    """Return the averaged response, and its lowest mass line."""
+    """Return the plant with the joint locked: averaged response and its lowest mass line."""
     averaged = estimate_plant(logs)
     lines = mass_lines(averaged)
     nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
@@ -183,7 +183,7 @@ def locked_plant(logs: list[RigLog]) -> Plant:
 
 
 def free_plant(logs: list[RigLog]) -> Plant:
-    """Return the averaged response; its first mode is at the largest ratio to a mass."""
+    """Return the plant with the joint free: its first mode has the largest ratio to a mass line."""
     averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)

@@ -42,7 +42,7 @@ SHOWN = (2, 3, 6)
 """Indices of the thesis's crossovers among them."""
 
 DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
-"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig
+"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side on the thesis's rig
 (friso's choice)."""
 
 CASES = {"locked": True, "free": False}
@@ -60,8 +60,8 @@ class Trace:
 class Startable:
     """A machine that comes to rest `after_move` and swings `after_release`.
 
-    No peaks are counted after the move, and after the release it swings to the end. It has its crossover [Hz], the
-    number of its rail, and the displacement [m] of the release.
+    After the move no peaks are counted; after the release it swings to the end. It has its crossover [Hz], the number
+    of its rail, and the displacement [m] of the release.
     """
 
     after_move: Trace
@@ -75,13 +75,12 @@ class Startable:
 class HuntingResult:
     """Results of the hunting experiment.
 
-    By `case` (locked, free) there are the outcomes of the moves, arrays of shape (crossovers, rails), at `crossovers`
-    [Hz] on `rails` (seeds, the stage's own first).
-
-    `started`: of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
-    `rail` is the number of the rail that the `traces` (by case and number of the crossover) and the logs show: the
-    first with counted peaks locked at the stage's own crossover, or else the stage's own; the crossovers `shown`
-    (numbers) are the thesis's. `startable` is a machine that comes to rest after the move, None if there is none.
+    `moves` are the outcomes of the moves by case (locked, free), arrays of shape (crossovers, rails), at `crossovers`
+    [Hz] on `rails` (seeds, the stage's own first). `started` are the outcomes of releases with the joint locked, shape
+    (displacements, crossovers, rails), by `displacements` [m]. `shown` are the numbers of the thesis's crossovers.
+    `rail` is the number of the rail that the logs and the `traces` (by case and number of the crossover) show: the
+    first one with counted peaks, locked, at the stage's own crossover, or else the stage's own. `startable` is a
+    machine that comes to rest after the move but hunts after a release, None if there is none.
     """
 
     distance: float
@@ -184,7 +183,7 @@ def _startable(
 ) -> Startable | None:
     """Return a machine that hunts after a release but not after the move, or None.
 
-    It is one at the lowest crossover, on a rail on which no peaks are counted after the move.
+    Of all such machines it has the lowest crossover, on a rail without counted peaks after the move.
     """
     lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))

@@ -28,11 +28,11 @@ PLACES = 3
 """Number of places along the travel (friso's choice)."""
 
 GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
-"""Excitation of a twentieth of static friction, RMS, up to 96 Hz on the thesis's rig, logged every 0.75 ms; longest
-sample time [s] on slower rigs."""
+"""Excitation with an RMS of a twentieth of static friction, up to 96 Hz on the thesis's rig, logged every 0.75 ms; and
+the longest sample time [s], for slower rigs."""
 
 LOOPS = np.linspace(0.2, 0.9, 8)
-"""Force amplitudes of loops over static friction; along the rail some break away."""
+"""Force amplitudes of loops over static friction. At the largest, some places along the rail break away."""
 
 PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
 """Periods of the crossover that a loop takes, number of loops, and samples of the log per period of the crossover (0.5
@@ -41,9 +41,9 @@ s and 1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Bristles:
-    """Results of the presliding experiment: a fit for each place, and the true bristles.
+    """Results of the presliding experiment: a fit for each place, the logs of loops, and true bristles.
 
-    The true stiffness is in [N/m], damping in [N s/m]; also the logs of the loops.
+    The true stiffness is in [N/m], the true damping in [N s/m].
     """
 
     by_place: tuple[Presliding, ...]
@@ -90,7 +90,10 @@ def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 
 
 def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
-    """Return the log of a loop at a place [m]: a sine of force, of a fraction `share` of static friction."""
+    """Return the log of loops at a place [m], made by a sinusoidal force.
+
+    Its amplitude is a fraction `share` of static friction.
+    """
     step = as_built_keys(stage)["drive.sample_time"]
     samples = round(PERIOD / pace(stage) / step)
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)

@@ -26,16 +26,15 @@ RAILS = 10
 """Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""
 
 LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
-"""Timing of the experiment in periods of the crossover, and samples of the log per period.
-
-The joint is loaded up to the friction force in the first time (2 s on the thesis's rig, at 0.63 mm/s). The reference
-stands for the second time between velocities. Samples are 1 ms apart on the thesis's rig."""
+"""Timing of the experiment in periods of the crossover, and samples of the log per period. LOADS is the time in which
+the joint is loaded up to the friction force (2 s on the thesis's rig, at 0.63 mm/s). STANDS is the time for which the
+reference stands between velocities. Samples are 1 ms apart on the thesis's rig."""
 
 SLIPS = 8
-"""Loads of the joint in each leg."""
+"""Number of times that the joint is loaded in each leg."""
 
 SPEEDS = (1, 2, -1, -2)
-"""Successive velocities over the slow one: forward and back (friso's choice)."""
+"""Successive velocities as multiples of the slow one: forward and back (friso's choice)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,7 @@ class Stiction:
     """Results of the stiction experiment.
 
     Each log is evaluated with the joint's true stiffness. For each rail there are the least and greatest true static
-    friction [N] along the cart's way, shape (rails, 2), and the slow velocity [m/s].
+    friction [N] where the cart went, shape (rails, 2), and the slow velocity [m/s].
     """
 
     by_rail: tuple[StickSlip, ...]
@@ -77,7 +76,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def _note(flat: Mapping[str, Any]) -> str:
-    """Return a note on the set-up of the stage."""
+    """Return a note on how the stage is set up."""
     stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
     return f"the limiters are set to {stroke}, which is recorded beside the logs for friso identify"
 
@@ -88,7 +87,7 @@ def slow_speed(stage: Stage) -> float:
 
 
 def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
-    """Return logs of slow legs there and back, on rails of successive seeds.
+    """Return logs of slow legs to and fro, on rails of successive seeds.
 
     All start from the same place.
     """
@@ -113,7 +112,7 @@ def _log(free: Stage, chunk: RecordedRuns, row: int, number: int, seed: int) -> 
 
 
 def true_range(log: RigLog) -> tuple[float, float]:
-    """Return the least and greatest static friction [N] along the cart's way."""
+    """Return the least and greatest static friction [N] where the cart went."""
     flat = anywhere(log.stage.flat())
     along = level_under_conditions(flat, "static") * friction_factors(flat, log.true["cart_position"])[0]
     return float(along.min()), float(along.max())

@@ -20,11 +20,12 @@ from friso.virtual_rig.run import run
 from friso.virtual_rig.task import staircase
 
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
-"""Size of a step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and directions of the steps (friso's choice)."""
+"""Size of a step in strokes (0.3 mm on the thesis's rig, Sec. 4.2.2), and directions of the steps (friso's choice)."""
 
 STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
 """Periods of the crossover for which each step stands (2 s on the thesis's rig), at least and at most; time constants
-of the integrator against the joint, if these take longer; samples of the log per period (1 ms), friso's choice."""
+of the integrator against the joint for which it stands, if these take longer; samples of the log per period (1 ms). All
+are friso's choice."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Stiffness:
 
     @property
     def apparent(self) -> float:
-        """Return the stiffness [N/m] that the drive's newtons make of the true one."""
+        """Return the stiffness [N/m] that the log shows, because the drive's newtons are too small."""
         return self.true / self.motor_constant_ratio
 
 
@@ -69,9 +70,10 @@ def steps(stage: Stage, seed: int) -> RigLog:
 
 
 def pulling_time(stage: Stage) -> float:
-    """Return the time constant [s] with which the integrator pulls the joint to the reference, with the cart fixed.
+    """Return the time constant [s] with which the integrator moves the joint to the reference.
 
-    It is proportional gain plus the joint's stiffness, over the integral gain; 0 without an integrator.
+    The cart is fixed. The time is proportional gain plus the joint's stiffness, over the integral gain; 0 without an
+    integrator.
     """
     flat = stage.flat()
     proportional, integral = slow_gains(flat)

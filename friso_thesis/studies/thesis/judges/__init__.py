@@ -1,7 +1,7 @@
-"""The judges of the claims, by figure; every module in this folder is imported, and registers those in it.
+"""Judges of the claims, by figure.
 
-A judge of a later claim is one more module here (or a function decorated with `judges` anywhere): the page lists
-its finding without a change.
+Every module in this folder is imported, and registers its judges. A judge of a later claim is one more module here (or
+a function decorated with `judges` anywhere); the page lists its finding without a change.
 """
 
 from importlib import import_module

@@ -1,5 +1,8 @@
-"""The arguments that the thesis gives in words: forces at full stroke, the mass to tune for, what a mass or a crossover
-does to the overshoot, what counted peaks mean."""
+"""Judge the arguments that the thesis gives in words.
+
+They concern forces at full stroke, the mass to tune for, what mass and crossover do to the overshoot, and what counted
+peaks mean.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from friso_thesis.studies.thesis.settings import JudgeSettings
 from friso_thesis.studies.thesis.studies import STUDIES
 
 LIGHT, HEAVY = "1.7 kg", "2.5 kg"
-"""The responses of the locked rig with the mass weighed and with the mass identified (Sec. 4.2.1)."""
+"""Names of the responses of the locked rig with the weighed mass and with the identified mass (Sec. 4.2.1)."""
 
 _MEASURED = 1.0, 2.5
 """Range of static friction [N] in Fig. 20."""
@@ -38,7 +41,7 @@ _START = 0.02
 
 @judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
 def force_at_full_stroke(evidence: Evidence) -> Finding:
-    """Return the rule at the thesis's own values, and over the map of stiffness and stroke."""
+    """Judge the rule for the force at full stroke, at the thesis's own values and over the map."""
     words = reading()
     flat = evidence.rig.flat()
     force, static = flat["joint.stiffness"] * flat["joint.stroke"], flat["friction.static"]
@@ -88,7 +91,7 @@ def _margins(stage_file: str) -> dict[float, float]:
 
 @judges("S342", figure="Sec. 3.4.2, mass the controller is tuned for", needs=(FREE,))
 def the_mass_to_tune_for(evidence: Evidence) -> Finding:
-    """Return the margins of all settled states, tuned for masses from the smallest that moves to the largest."""
+    """Judge for which mass to tune, by the margins of all settled states over the tuning mass."""
     margins = _margins(evidence.rig.to_toml())
     (small, of_small), *_, (_, whole) = margins.items()
     best = max(margins, key=lambda mass: margins[mass])
@@ -113,7 +116,7 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
 
 @judges("S352", figure="Sec. 3.5, acceleration")
 def close_to_ten_g(evidence: Evidence) -> Finding:
-    """Return the peak force over the masses weighed and identified."""
+    """Judge the acceleration by the peak force over the weighed and the identified mass."""
     reached = [_PEAK_FORCE / mass / _GRAVITY for mass in _MASSES]
     rows = tuple((f"{mass:g} kg", f"{_PRESCRIBED * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in _MASSES)
     return Finding(
@@ -133,8 +136,10 @@ def close_to_ten_g(evidence: Evidence) -> Finding:
 
 @judges("S41", figure="Sec. 4.1, why mass helps", needs=(LIGHT, HEAVY))
 def why_mass_helps(evidence: Evidence) -> Finding:
-    """Return the first slip across the reference after the return move,
-    with both masses at the same crossover."""
+    """Judge why mass helps, by the first slip across the reference after the return move.
+
+    Both masses have the same crossover.
+    """
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
     why = "" if np.isfinite([*light, *heavy]).all() else "One of the two has no overshoot: there is nothing to compare."
@@ -162,12 +167,11 @@ def _compared(names: tuple[str, str], values: tuple[float, float], unit: str) ->
 
 
 def _overshooting_slip(response: Response) -> tuple[float, float]:
-    """Return the largest acceleration [m/s^2] of the cart and the overshoot [m] beyond the
-    reference in the first such slip.
+    """Return acceleration [m/s^2] and overshoot [m] of the first slip across the reference.
 
-    It is the first slip after the end of the reference's motion that begins on one side of the reference and ends on
-    the other; NaN without one. The cart also slows down where its first swing turns, and a slip back from there crosses
-    nothing.
+    The slip is the first after the end of the reference's motion that begins on one side of the reference and ends on
+    the other; NaN without one. The acceleration is the cart's largest. The cart also slows down where its first swing
+    turns, and a slip back from there crosses nothing.
     """
     trace = response.trace
     time, velocity = trace["time"].values, trace["cart_velocity"].values
@@ -186,7 +190,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
 
 @judges("F25O", figure="25", needs=("system",), of_runs=True)
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
-    """Return the swing at the end over the crossover, at every mass of the map."""
+    """Judge whether overshoot falls with crossover, by the swing at the end at every mass of the map."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -209,10 +213,10 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 
 @judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
-    """Judge whether counted peaks mean a cycle:
-    the fraction of cells with peaks whose run still swings at its end.
+    """Judge whether counted peaks mean a cycle.
 
-    By attraction, it is the fraction of decided cells that a cycle attracts, for every map.
+    By the count, it is the fraction of cells with peaks whose run still swings at its end. By attraction, it is the
+    fraction of decided cells that a cycle attracts, for every map.
     """
     words = reading()
     rows, counted, lasting = [], 0, 0

@@ -1,4 +1,4 @@
-"""Fig. 12: friction forces, and alpha and beta, of the locked rig."""
+"""Judge Fig. 12: friction forces, and alpha and beta, of the locked rig."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _GAP = 1.0
 
 @judges("F12A", figure="12A", needs=("friction",))
 def gap_makes_hunting(evidence: Evidence) -> Finding:
-    """Return the smallest gap at which runs keep moving, and how the count goes with the gap."""
+    """Judge the smallest gap at which runs keep moving, and how the count depends on the gap."""
     words = reading()
     axes = ("friction.static", "friction.coulomb")
     static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], *axes)
@@ -80,7 +80,7 @@ def smallest_gap(evidence: Evidence) -> float:
 
 @judges("F12B", figure="12B", needs=("control",))
 def control_is_no_cure(evidence: Evidence) -> Finding:
-    """Return how the count goes with alpha and beta, and whether either brings all runs to rest."""
+    """Judge how the count depends on alpha and beta, and whether either brings all runs to rest."""
     words = reading()
     axes = (ALPHA, BETA)
     alpha, beta, moving, valid = verdict_table(evidence.maps["control"], *axes)

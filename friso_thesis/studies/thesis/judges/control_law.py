@@ -1,5 +1,7 @@
-"""Sec. 3.2.4, 3.4.2, 4.2.1: what the thesis says of its controller in words: two forms of it, where its crossover may
-lie, and the motor constant."""
+"""Judge what the thesis says about its controller (Sec. 3.2.4, 3.4.2, 4.2.1).
+
+It concerns two forms of the controller, where its crossover may lie, and the motor constant.
+"""
 
 from __future__ import annotations
 
@@ -28,14 +30,14 @@ LAW_OF_RULES = K_P * (1 + TAU_Z / TAU_I + 1 / (TAU_I * S) + TAU_Z * S) / (TAU_P 
 
 
 def law_of_gains(gains: tuple[sp.Expr, sp.Expr, sp.Expr]) -> sp.Expr:
-    """Return Eq. 6 for gains K_p, K_i and K_d, its filter that of Eq. 7."""
+    """Return Eq. 6 for gains K_p, K_i and K_d, with the filter of Eq. 7."""
     proportional, integral, derivative = gains
     return proportional + integral / S + derivative * S / (S * TAU_P + 1)
 
 
 @cache
 def rewritten() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return the gains K_p, K_i and K_d with which Eq. 6 is Eq. 7, by the partial fractions of Eq. 7."""
+    """Return the gains K_p, K_i and K_d for which Eq. 6 equals Eq. 7, by partial fractions."""
     integral = K_P / TAU_I
     proportional = K_P * (1 + TAU_Z / TAU_I) - integral * TAU_P
     return proportional, integral, K_P * TAU_Z - proportional * TAU_P
@@ -43,12 +45,12 @@ def rewritten() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 
 @judges("E6", figure="Eq. 6 to 8")
 def two_forms_of_the_controller(evidence: Evidence) -> Finding:
-    """Return Eq. 7 in the form of Eq. 6, and its gains by Eq. 8."""
+    """Judge whether Eq. 7 can take the form of Eq. 6, and its gains by Eq. 8."""
     return judged_forms(rewritten(), numbers(evidence.rig.flat()))
 
 
 def judged_forms(gains: tuple[sp.Expr, sp.Expr, sp.Expr], tuned: dict[str, float]) -> Finding:
-    """Return the finding from the gains of Eq. 6, and the numbers of Eq. 8 for a rig."""
+    """Judge the gains of Eq. 6, and the numbers of Eq. 8 for a rig."""
     values = [float(gain.subs({symbol: tuned[str(symbol)] for symbol in gain.free_symbols})) for gain in gains]
     plain = as_gains(**tuned)
     kp, ki, kd = values
@@ -79,8 +81,10 @@ def _written(expression: sp.Expr) -> str:
 
 @lru_cache(maxsize=256)
 def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
-    """Return the modulus margin of the settled states with the joint free (0: not stable) by the crossover over the
-    `first` eigenfrequency [Hz]."""
+    """Return the modulus margin of settled states, joint free, by crossover (0: not stable).
+
+    Crossovers are relative to the `first` eigenfrequency [Hz].
+    """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     reach = 2 * JudgeSettings.current().far_crossover_factor
     ratios = np.geomspace(1 / reach, reach, 25)
@@ -89,7 +93,7 @@ def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
 
 @judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"), of_runs=True)
 def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
-    """Return the margin of the free joint's loop over its crossover, and forces and settling times of the runs."""
+    """Judge the crossover by the margin of the free joint's loop, and by forces and settling times of runs."""
     first = evidence.analysis.plants["stuck"].first
     runs = evidence.maps["isolator-crossover"]
     crossover, _, moving, valid = verdict_table(runs, CROSSOVER, "joint.stroke")
@@ -103,8 +107,10 @@ def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
 
 
 def judged_crossovers(margins: dict[float, float], first: float, force: float, settling: float) -> Finding:
-    """Return the finding from margins over the crossover, in `first` eigenfrequencies [Hz], and from the rank
-    correlations of force and settling time with it."""
+    """Judge margins over the crossover, and the rank correlations of force and settling time with it.
+
+    Crossovers are in `first` eigenfrequencies [Hz].
+    """
     words, far = reading(), JudgeSettings.current().far_crossover_factor
     near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}
     worst = min(near, key=lambda ratio: near[ratio])
@@ -137,7 +143,7 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
 
 @judges("S421", figure="Sec. 4.2.1, motor constant")
 def motor_constant_cancels(evidence: Evidence) -> Finding:
-    """Return the loop with a motor that is stronger or weaker than assumed, tuned for the mass that it shows."""
+    """Judge the loop with a stronger or weaker motor than assumed, tuned for the mass that it shows."""
     flat = evidence.rig.flat()
     omega = 2 * np.pi * np.geomspace(0.1, 1e3, 100)
     own = loops(flat, member(1.0), omega)

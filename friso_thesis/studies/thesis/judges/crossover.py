@@ -1,4 +1,4 @@
-"""Fig. 16: crossover and stroke of the isolated rig, at both stiffnesses of the joint."""
+"""Judge Fig. 16: crossover and stroke of the isolated rig, at both stiffnesses of the joint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _AXES = (CROSSOVER, "joint.stroke")
 
 @judges("F16A", figure="16A", needs=("isolator-crossover",))
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
-    """Return the crossover below which the isolated rig keeps moving, at each stroke."""
+    """Judge the crossover below which the isolated rig keeps moving, at each stroke."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, valid = verdict_table(runs, *_AXES)
@@ -52,7 +52,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
 
 @judges("F16B", figure="16B", needs=("isolator-crossover", "isolator-crossover-soft"))
 def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
-    """Return the limits of both stiffnesses, stroke by stroke."""
+    """Judge the limits of both stiffnesses, stroke by stroke."""
     words = reading()
     names = ("isolator-crossover", "isolator-crossover-soft")
     stiff, soft = (_limits(evidence.maps[name]) for name in names)

@@ -1,4 +1,4 @@
-"""Sec. 4.3.3 and 6: the rules of design."""
+"""Judge the rules of design (Sec. 4.3.3 and 6)."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
 
 _WORKS, _LOCKED = 5.25, 15.0
-"""Crossovers [Hz] above which the isolated rig works (middle of 5 and 5.5 Hz), and above which the locked rig does."""
+"""Crossovers [Hz] above which the isolated rig works (middle of 5 and 5.5 Hz), and the locked rig."""
 
 _MOVING_MASS, _WEIGHED = 2.5, 1.7
-"""Moving mass [kg] of the rig to which the abstract ties them, and the mass weighed, that of the simulations."""
+"""Moving mass [kg] of the rig to which the abstract ties the crossovers, and the weighed mass of the simulations."""
 
 _EXPERIMENT = 14.3
 """Crossover [Hz] at which the locked rig did not hunt (Sec. 4.3.2)."""
@@ -45,7 +45,7 @@ def rules_of_design(evidence: Evidence) -> Finding:
 
 
 def _soft(evidence: Evidence) -> Part:
-    """Tell whether a joint that is softer than one that does, does too."""
+    """Judge whether a joint softer than one that works also works."""
     runs, axes = evidence.maps["isolator-stiffness"], ("joint.stiffness", "joint.stroke")
     stiffness, stroke, moving, _ = verdict_table(runs, *axes)
     enough = stroke >= _STROKE
@@ -62,8 +62,10 @@ def _soft(evidence: Evidence) -> Part:
 
 @lru_cache(maxsize=256)
 def _needed_ratio(stage_file: str) -> float:
-    """Return the least parasitic frequency over the crossover from which the rig has a modulus
-    margin of 0.5 in all settled states; NaN if it never has."""
+    """Return the least ratio of parasitic frequency to crossover for a modulus margin of 0.5.
+
+    The margin must hold in all settled states. The result is NaN if the rig never has it.
+    """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
     enough = np.nan
@@ -76,8 +78,10 @@ def _needed_ratio(stage_file: str) -> float:
 
 @lru_cache(maxsize=256)
 def _margins_at_the_top(stage_file: str) -> dict[str, float]:
-    """Return the least modulus margin of the settled states at the highest crossover,
-    joint locked and free; 0: unstable."""
+    """Return the least modulus margin of the settled states at the highest crossover.
+
+    It is given with the joint locked and free; 0 if unstable.
+    """
     flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
@@ -106,15 +110,17 @@ def _far(rig: Stage) -> Part:
 
 
 def _strokes_needed(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stiffnesses of the map [N/m],
-    and the stroke [m] beyond which nothing keeps moving at 8 Hz with each."""
+    """Return the stiffnesses of the map [N/m], and the stroke [m] needed at 8 Hz with each.
+
+    Beyond that stroke nothing keeps moving.
+    """
     runs, axes = evidence.maps["isolator-stiffness"], ("joint.stroke", "joint.stiffness")
     stroke, stiffness, moving, _ = verdict_table(runs, *axes)
     return stiffness, ends(stroke, moving, sizes(runs, *axes))
 
 
 def _stroke(evidence: Evidence) -> Part:
-    """Return the stroke needed with the joint as built."""
+    """Judge the stroke needed with the joint as built."""
     stiffness, by_stiffness = _strokes_needed(evidence)
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(by_stiffness[nearest])
@@ -127,7 +133,7 @@ def _stroke(evidence: Evidence) -> Part:
 
 
 def _softer_needs_less_stroke(evidence: Evidence) -> Part:
-    """Return how the stroke needed goes with the stiffness."""
+    """Judge how the stroke needed depends on the stiffness."""
     words = reading()
     stiffness, needed = _strokes_needed(evidence)
     rises = trend(stiffness, needed)
@@ -154,7 +160,7 @@ def _gap(evidence: Evidence) -> Part:
 def _locked_edge() -> str:
     """Say up to which crossover the cycle of the locked rig attracts, with the mass of the rule.
 
-    The crossover is that of `friso check`.
+    `friso check` gives the crossover.
     """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
@@ -164,7 +170,7 @@ def _locked_edge() -> str:
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
-    """Return from which crossover on the isolated and the locked rig come to rest."""
+    """Judge from which crossover the isolated and the locked rig come to rest."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
@@ -204,8 +210,7 @@ def locked_limit(evidence: Evidence, mass: float) -> float:
 
 @judges("F25P", figure="25", needs=("system",))
 def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
-    """Return the limit of the parameter study at the mass with which it was made,
-    beside that of the experiment."""
+    """Judge the limit of the parameter study at its own mass, beside that of the experiment."""
     weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
     return Finding(
         (

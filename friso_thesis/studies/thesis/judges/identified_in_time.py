@@ -1,4 +1,7 @@
-"""Fig. 19 to 21: stiffness and friction as the thesis identifies them in time, by the same experiments simulated."""
+"""Judge stiffness and friction as the thesis identifies them in time (Fig. 19 to 21).
+
+The same experiments are simulated.
+"""
 
 from __future__ import annotations
 
@@ -30,17 +33,17 @@ _SPIKE = 0.1
 """Time [s] within which a spike of the velocity follows a peak of the deflection."""
 
 _UNIFORM = "uniform friction along the rail, no noise"
-"""Assumptions about the simulated rig."""
+"""Assumptions about the simulated rig, in words."""
 
 
 @judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
-    """Return the steps of the rig with its cart fixed."""
+    """Judge the position steps of the rig with its cart fixed."""
     return judged_steps(evidence.experiments.joint_steps)
 
 
 def judged_steps(steps: JointSteps) -> Finding:
-    """Return the finding from the simulated steps."""
+    """Judge simulated position steps."""
     words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
@@ -77,7 +80,7 @@ def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
 
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
-    """Return the finding from simulated slow motion."""
+    """Judge simulated slow motion."""
     slips = sum(len(run.result.forces) for run in runs)
     forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
@@ -112,8 +115,10 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
 
 
 def _spikes(run: SlowMotion) -> bool:
-    """Tell whether the velocity of the cart spikes after every peak,
-    to more than half of the usual."""
+    """Tell whether the velocity of the cart spikes after every peak.
+
+    A spike is more than half of the usual one.
+    """
     slips, time = run.result, run.log.time
     after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
     return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
@@ -121,23 +126,23 @@ def _spikes(run: SlowMotion) -> bool:
 
 @judges("F21", figure="21", needs=(SPEEDY,), undrawn=RAIL)
 def force_at_constant_speed(evidence: Evidence) -> Finding:
-    """Judge the force of passes at constant speed, with the joint free, as in Sec. 4.2.3, and locked."""
+    """Judge the force of passes at constant speed, with the joint free (Sec. 4.2.3) and locked."""
     return judged_speeds(*evidence.experiments.constant_speed)
 
 
 def force_swings(runs: ConstantSpeed) -> list[float]:
-    """Return the standard deviation of the force over its mean in each pass, from a tenth of the way on."""
+    """Return the standard deviation of the force over its mean in each pass, after a tenth of the way."""
     forces = [runs.log["force"][part] for part in runs.log.segments]
     return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
 
 
 def _swing_text(share: float) -> str:
-    """Write a fraction to a hundredth of a percent; smaller ones mean a steady force."""
+    """Write a fraction to a hundredth of a percent; a smaller one means a steady force."""
     return percent(round(share, 4))
 
 
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
-    """Return the finding from the passes of the rig as built."""
+    """Judge the passes with the real drive."""
     words = reading()
     named = {"free": free, "locked": locked}
     swings = {name: force_swings(runs) for name, runs in named.items()}

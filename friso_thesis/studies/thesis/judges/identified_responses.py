@@ -1,7 +1,7 @@
-"""Fig. 17 and 18: the responses by which the thesis identifies its rig, by the same experiments on the simulated one.
+"""Judge the responses by which the thesis identifies its rig (Fig. 17 and 18).
 
-What is entered in the simulation (masses, stiffness, friction of Table 2) cannot come out otherwise than entered; what
-can be judged is whether the experiments show it, and what else they would have to show.
+The same experiments are simulated. What the simulation assumes (masses, stiffness, friction of Table 2) must come out
+as entered. So the judges ask whether the experiments show it, and what else they would have to show.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ FIRST, _PARASITIC = 11.0, 300.0
 
 @judges("F17", figure="17", needs=(LINE, BUILT))
 def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
-    """Return the mass line with friction at several places."""
+    """Judge the mass line with friction at several places."""
     flat = evidence.rig.flat()
     line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
     return Finding((*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0]))))
 
 
 def judged_line(line: LockedLine, moved: float) -> Finding:
-    """Return the finding from the simulated responses of a rig that moves so much mass [kg]."""
+    """Judge the simulated responses of a rig with the moving mass `moved` [kg]."""
     words = reading()
     rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)

@@ -1,4 +1,4 @@
-"""Sec. 3.3: which parameter decides most on hunting, over the ranges of Table 3 drawn together."""
+"""Judge which parameter decides most on hunting (Sec. 3.3), over the ranges of Table 3 together."""
 
 from __future__ import annotations
 
@@ -37,13 +37,16 @@ _NAMES: Mapping[str, str] = MappingProxyType(
 
 @judges("S33", figure="Sec. 3.3, influence")
 def ranks_of_influence(evidence: Evidence) -> Finding:
-    """Return how well each parameter of Table 3 separates the stages that hunt from the others."""
+    """Judge how well each parameter of Table 3 separates stages that hunt from others."""
     return judged_ranks(*influences(evidence.rig.to_toml()))
 
 
 @lru_cache(maxsize=8)
 def influences(stage_file: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the rank-biserial correlation of every parameter with counted peaks, the joint locked and free."""
+    """Return the rank-biserial correlation of every parameter with counted peaks.
+
+    It is given with the joint locked, and free.
+    """
     locked = [STUDIES[name] for name in _LOCKED]
     free = [STUDIES[name] for name in _FREE] + [STUDIES["isolator-damping"], STUDIES["isolator-crossover"]]
     return _influence(stage_file, locked, True), _influence(stage_file, free, False)
@@ -63,7 +66,10 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
 
 
 def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
-    """Return the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1); 0 if all stages are alike."""
+    """Return the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1).
+
+    It is 0 if all stages hunt, or none.
+    """
     from scipy.stats import mannwhitneyu
 
     if hunts.all() or not hunts.any():
@@ -73,7 +79,7 @@ def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
 
 
 def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Finding:
-    """Return the finding from the correlations of all parameters, the joint locked and free."""
+    """Judge the correlations of all parameters, with the joint locked and free."""
     orders = {name: sorted(of, key=lambda key: -abs(of[key])) for name, of in (("locked", locked), ("free", free))}
     rows = tuple(
         (name, str(place), key, f"{of[key]:+.2f}")

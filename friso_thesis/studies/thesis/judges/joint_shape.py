@@ -1,4 +1,7 @@
-"""Sec. 3.4.1: what the thesis says of parallel leaf springs in words: shortening, width, length, where to push."""
+"""Judge what the thesis says about parallel leaf springs (Sec. 3.4.1).
+
+It concerns shortening, width, length, and where to push.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +27,19 @@ _STIFFNESSES = "drive", "support_x", "support_y"
 
 @cache
 def evaluated(dimension: str = "", factor: float = 1.0) -> Evaluation:
-    """Return the leaf springs of Sec. 3.5, one of their dimensions larger by a factor."""
+    """Evaluate the leaf springs of Sec. 3.5, with one of their dimensions larger by a factor."""
     own = mechanism(_YOUNG, _SPACING, 0.0)
     return beams(replace(own, **{dimension: factor * getattr(own, dimension)}) if dimension else own, STROKE)
 
 
 @judges("S341S", figure="Sec. 3.4.1, shortening")
 def shortening_is_negligible(evidence: Evidence) -> Finding:
-    """Return how nonlinear the leaves are, and how much they shorten, at full stroke."""
+    """Judge how nonlinear the leaves are, and how much they shorten, at full stroke."""
     return judged_shortening(evaluated())
 
 
 def judged_shortening(leaves: Evaluation) -> Finding:
-    """Return the finding from leaf springs at full stroke."""
+    """Judge leaf springs at full stroke."""
     share, least = leaves.shortening / leaves.stroke, JudgeSettings.current().negligible_share
     return Finding(
         (
@@ -58,19 +61,19 @@ def judged_shortening(leaves: Evaluation) -> Finding:
 
 @judges("S341W", figure="Sec. 3.4.1, width and length")
 def width_against_length(evidence: Evidence) -> Finding:
-    """Return the stiffnesses of leaves that are wider, and of leaves that are longer."""
+    """Judge the stiffnesses of leaves that are wider, and of leaves that are longer."""
     return judged_dimensions(*(_ratios(name) for name in ("width", "length")))
 
 
 def _ratios(dimension: str) -> tuple[float, float, float]:
-    """Return the factors by which drive stiffness, and the support along the leaves and along their width, change."""
+    """Return the factors by which three stiffnesses change: drive, along the leaves, along their width."""
     own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
     return drive, along, across
 
 
 def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, float, float]) -> Finding:
-    """Return the finding from the factors of the stiffnesses of wider and of longer leaves."""
+    """Judge the factors on the stiffnesses of wider and of longer leaves."""
     words, settings = reading(), JudgeSettings.current()
     alike, larger = settings.negligible_share, settings.leaf_change_factor
     drive, along, across = wider
@@ -98,13 +101,13 @@ def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, fl
 
 @judges("S341A", figure="Sec. 3.4.1, where to push")
 def pushed_at_the_centre(evidence: Evidence) -> Finding:
-    """Return where a force along the drive tilts the stage not at all."""
+    """Judge where a force along the drive does not tilt the stage."""
     leaves = evaluated()
     return judged_place(leaves.stiffness[0], leaves.mechanism.length)
 
 
 def judged_place(stiffness: np.ndarray, length: float) -> Finding:
-    """Return the finding from the stiffness (6, 6) of the stage at the leaf ends, for leaves of a length [m].
+    """Judge the place from the stage's stiffness (6, 6) at the leaf ends, for leaves of a length [m].
 
     A force F along z that acts at a distance d from the leaf ends exerts the moment -d F about y.
     """

@@ -1,4 +1,4 @@
-"""Sec. 3.5: the leaf springs of the rig."""
+"""Judge the leaf springs of the rig (Sec. 3.5)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from friso_thesis.studies.thesis.reading import reading
 from friso_thesis.studies.thesis.studies import thesis_rig
 
 STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
-"""What the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa] (Sec. 3.5)."""
+"""Stroke, stiffness, first and parasitic frequency, and stress that the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa]
+(Sec. 3.5)."""
 
 _CLOSE = 0.05
-"""Relative difference within which stiffness and first frequency should agree.
-
-Only the steel is left open for both."""
+"""Relative difference within which stiffness and first frequency should agree. For both, the thesis leaves only the
+steel open."""
 
 _YOUNG = (185e9, 195e9, 210e9)
 """Young's moduli [Pa] of stainless spring steel: as rolled, tempered, and of steel in general."""
@@ -34,13 +34,16 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
-    """Return the thesis's leaves over what it leaves open."""
+    """Evaluate the thesis's leaves for all values that it leaves open."""
     return tuple(beams(mechanism(*variant), STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 
 def mechanism(young: float, spacing: float, height: float) -> Mechanism:
-    """Return the rig's leaf springs for a Young's modulus [Pa], a spacing of the leaves [m], and a height [m] of the
-    stage's centre of mass above their ends."""
+    """Return the rig's leaf springs for values that the thesis leaves open.
+
+    They are a Young's modulus [Pa], a spacing of the leaves [m], and a height [m] of the stage's centre of mass above
+    the leaf ends.
+    """
     steel, mass, length = materials()["stainless 1.4310"], thesis_rig().flat()["masses.stage"], 70e-3
     centre = (length + height, 0.0, 0.0)
     return Mechanism(
@@ -93,7 +96,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
-    """Return the first mode other than the drive mode, over the parameters left open."""
+    """Judge the first mode other than the drive mode, over the parameters left open."""
     words = reading()
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     visible = np.array(
@@ -127,5 +130,5 @@ def _range(values: np.ndarray) -> str:
 
 
 def _millimetres(lengths: Sequence[float]) -> str:
-    """Return the range of lengths [m]."""
+    """Return the range of lengths [m] in millimetres, as text."""
     return f"{1e3 * min(lengths):g} to {1e3 * max(lengths):g} mm"

@@ -1,4 +1,4 @@
-"""Fig. 7: the plant in the four limit cases of Table 1."""
+"""Judge Fig. 7: the plant in the four limit cases of Table 1."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
 
 
 def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
-    """Return the eigenfrequency of the free joint, and its pair where the cart slides."""
+    """Judge the eigenfrequency of the free joint, and its pair of frequencies if the cart slides."""
     words = reading()
     low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
     pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
@@ -57,7 +57,7 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
 
 
 def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
-    """Return the parasitic mode, and the pair above it where the limiter is touched."""
+    """Judge the parasitic mode, and the pair of frequencies above it if the limiter is touched."""
     words = reading()
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}

@@ -1,4 +1,4 @@
-"""Fig. 8, 22 and 23: the open loops, simulated and measured, and how fast the controller may be."""
+"""Judge the open loops, simulated and measured, and how fast the controller may be (Fig. 8, 22, 23)."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 
 def _beyond(locked: CrossoverLoops) -> str:
-    """Return what crosses 0 dB besides, at the highest setting."""
+    """Say what else crosses 0 dB at the highest setting."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
-    """Tell whether the loop is stable as Fig. 8 linearises it, about initial speeds of the cart."""
+    """Judge whether the loop is stable as Fig. 8 linearises it, about initial speeds of the cart."""
     settings = FrequencySettings.current()
     unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
@@ -86,7 +86,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
-    """Return the crossings of the locked rig, sliding, at the thesis's settings."""
+    """Judge the crossings of the locked rig, sliding, at the thesis's settings."""
     words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
@@ -116,7 +116,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 
 def _why_elsewhere(contact: Contact) -> str:
-    """Return what it would take to cross 0 dB where the thesis measured it."""
+    """Say what it would take to cross 0 dB where the thesis measured it."""
     soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
         "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
@@ -127,7 +127,7 @@ def _why_elsewhere(contact: Contact) -> str:
 
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
-    """Tell whether a further crossing takes the loop close to instability."""
+    """Judge whether a further crossing takes the loop close to instability."""
     close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
@@ -148,8 +148,7 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
-    """Return the crossing of the free joint tuned for the whole mass,
-    and its highest stable setting."""
+    """Judge the crossing of the free joint tuned for the whole mass, and its highest stable setting."""
     words = reading()
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
@@ -186,7 +185,7 @@ def crossing_nearest(margins: Margins, frequency: float) -> float:
 
 
 def _further(margins: Margins, setting: float) -> tuple[float, ...]:
-    """Return the crossings of 0 dB above that of the tuned crossover [Hz]."""
+    """Return the 0 dB crossings [Hz] above that of the tuned crossover."""
     return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 
@@ -204,7 +203,7 @@ def _hertz(crossover: float | None) -> str:
 
 
 def _sampled(analysis: Linear) -> FindingTable:
-    """Return what sampling and delays leave of the highest stable crossover."""
+    """Return a table of what sampling and delays leave of the highest stable crossover."""
     rows = tuple(
         (_micro(delay), _hertz(free), _hertz(analysis.locked.sampled[delay]))
         for delay, free in analysis.free.sampled.items()

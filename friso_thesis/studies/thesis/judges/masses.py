@@ -1,4 +1,4 @@
-"""Fig. 15: masses and friction forces of the isolated rig."""
+"""Judge Fig. 15: masses and friction forces of the isolated rig."""
 
 from __future__ import annotations
 

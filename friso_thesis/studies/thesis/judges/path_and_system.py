@@ -1,4 +1,4 @@
-"""Fig. 11: path, and crossover and mass, of the locked rig."""
+"""Judge Fig. 11 of the locked rig: path, and crossover and mass."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ENDS = 20.0
 """Crossover above which the thesis saw no hunting [Hz] (Sec. 4.1)."""
 
 TRAVEL = 0.16
-"""Travel of the rig's actuator [m] (Sec. 3.5): longer paths of Fig. 11A are simulated alone."""
+"""Travel of the rig's actuator [m] (Sec. 3.5). Longer paths of Fig. 11A exist in simulation only."""
 
 
 @judges("F11A", figure="11A", needs=("path",))
@@ -79,7 +79,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
-    """Return the highest crossover that keeps moving, over all masses and for each."""
+    """Judge the highest crossover that keeps moving, over all masses and for each."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -111,8 +111,10 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
 
 
 def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
-    """Return how many cells keep moving at the highest crossover at which any does,
-    and with how many peaks."""
+    """Say how many cells keep moving at the highest crossover at which any does.
+
+    The text also gives their numbers of peaks.
+    """
     rows = np.flatnonzero(moving.any(axis=1))
     if not rows.size:
         return ""

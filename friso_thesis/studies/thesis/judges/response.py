@@ -1,4 +1,4 @@
-"""Fig. 5: the response of the locked rig."""
+"""Judge Fig. 5: the response of the locked rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Fig. 24 to 28: hunting and standstill of the rig as built: sampled, delayed, on rails whose friction varies."""
+"""Judge hunting and standstill of the rig with its real drive (Fig. 24 to 28).
+
+The drive samples and delays, and friction varies along rails.
+"""
 
 from __future__ import annotations
 
@@ -29,31 +32,31 @@ _DEVIATIONS = 0.1e-6, 1e-6
 
 
 def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
-    """Return the number of runs with counted peaks, and of all runs."""
+    """Return the number of runs with counted peaks, and the number of all runs."""
     done = ~runs.failed[which]
     return int((runs.counted[which] & done).sum()), int(done.sum())
 
 
 def _beside(counted: tuple[int, int], threshold: float) -> str:
-    """Return that a fraction of rails is undecided if its interval holds the threshold, else an empty text."""
+    """Return that a fraction of rails is undecided if its interval holds the threshold, else ""."""
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""
 
 
 def _rails(counted: tuple[int, int]) -> str:
-    """Write on how many rails peaks are counted, with the interval of their fraction."""
+    """Say on how many rails peaks are counted, with the interval of their fraction."""
     low, high = share_interval(*counted)
     return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
 
 
 @judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
 def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
-    """Return the move at 8 Hz."""
+    """Judge the move at 8 Hz."""
     return judged_move(evidence.experiments.moves)
 
 
 def judged_move(moves: MovesOnRails) -> Finding:
-    """Return the finding from the moves on several rails."""
+    """Judge moves on several rails."""
     words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
@@ -72,12 +75,12 @@ def judged_move(moves: MovesOnRails) -> Finding:
 
 @judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
 def locked_needs_crossover(evidence: Evidence) -> Finding:
-    """Return the move at the crossovers of Fig. 25, and releases at the middle one."""
+    """Judge the move at the crossovers of Fig. 25, and releases at the middle one."""
     return judged_crossovers(evidence.experiments.moves)
 
 
 def judged_crossovers(moves: MovesOnRails) -> Finding:
-    """Return the finding from moves and releases with the joint locked."""
+    """Judge moves and releases with the joint locked."""
     low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
     words, quiet = reading(), (middle[1] - middle[0], middle[1])
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
@@ -113,7 +116,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """Return the fraction of rails over stroke and crossover."""
+    """Judge the fraction of rails over stroke and crossover."""
     return judged_grid(evidence.experiments.grid)
 
 
@@ -146,13 +149,12 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
 
 @judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
 def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
-    """Return the cycle of an even rail against those of rails that vary."""
+    """Judge the cycle on an even rail against cycles on rails that vary."""
     return judged_cycles(evidence.experiments.cycles)
 
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
-    """Return the finding from the cycles on an even rail,
-    which is the simulation of the thesis, and on rails that vary."""
+    """Judge cycles on an even rail, as the thesis simulates, and on rails that vary."""
     words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
@@ -206,7 +208,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
 
 
 def _weak_motor(cycles: CyclesOnRails) -> str:
-    """Return what a weaker motor and more Coulomb friction do to the cycle on an even rail."""
+    """Say what a weaker motor and more Coulomb friction do to the cycle on an even rail."""
     cause = (
         f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "
         f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
@@ -224,12 +226,12 @@ _COMPARED = ("period", "swing")
 
 @judges("F28", figure="28", needs=(STANDSTILL,))
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
-    """Return the standstill with the joint locked and free, and with more damping."""
+    """Judge the standstill with the joint locked and free, and with more damping."""
     return judged_standstill(evidence.experiments.standstill)
 
 
 def judged_standstill(standstill: InPosition) -> Finding:
-    """Return the finding from the standstills."""
+    """Judge standstills."""
     words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
@@ -273,7 +275,7 @@ def _sized(peaks: tuple[float, float]) -> bool:
 
 
 def _over_noise(standstill: InPosition) -> str:
-    """Write at which force noises the deviations are as measured."""
+    """Say at which force noises the deviations are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:
@@ -283,7 +285,7 @@ def _over_noise(standstill: InPosition) -> str:
 
 
 def _noises(standstill: InPosition) -> FindingTable | None:
-    """Return the deviations over the noise of the force, where it was varied."""
+    """Return a table of the deviations over the noise of the force, if that was varied."""
     rows = tuple(
         (f"{factor:g}", f"{locked * 1e6:.2g} um", f"{free * 1e6:.2g} um", f"{free / locked:.2g}")
         for factor, (locked, free) in standstill.louder.items()

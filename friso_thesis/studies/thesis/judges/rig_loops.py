@@ -1,4 +1,4 @@
-"""Fig. 17, 18, 22 and 23: what the rig with its drive as built adds, measured as the thesis measured."""
+"""Add what the rig with its real drive shows (Fig. 17, 18, 22, 23), measured as in the thesis."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ ASSUMED = (
 
 
 RAIL = "how friction varies along the rail, which rails these are, the drive's delay"
-"""Assumptions about the rig as built that are not drawn."""
+"""Assumptions about the rig with its real drive that are not drawn."""
 
 
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
-    """Return the parts that the rig as built adds; none where it was not run."""
+    """Return the parts that the rig with its real drive adds; none if it was not run."""
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
 
 
 def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
-    """Return where the open loops of the locked rig cross 0 dB."""
+    """Judge where the open loops of the locked rig cross 0 dB."""
     return _crossings(loops), _further(loops)
 
 
@@ -53,7 +53,7 @@ def _crossings(loops: RigLoops) -> Part:
 
 
 def _further(loops: RigLoops) -> Part:
-    """Tell whether the loop with the highest setting crosses again."""
+    """Judge whether the loop with the highest setting crosses 0 dB again."""
     words = reading()
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
@@ -80,7 +80,7 @@ def _peak(loop: MeasuredLoop, low: float) -> tuple[float, float]:
 
 
 def measured_free(loops: RigLoops) -> tuple[Part, Part]:
-    """Return where the open loop of the free joint crosses 0 dB, and the highest stable tuning."""
+    """Judge where the open loop of the free joint crosses 0 dB, and its highest stable tuning."""
     crossed = max((crossing.value for crossing in loops.free.crossings), default=np.nan)
     highest = highest_stable(loops.settings, loops.stable)
     return (
@@ -102,7 +102,7 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
 
 
 def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
-    """Tell whether a weaker motor shows the mass seen [kg]; `joint` is 0 locked, 1 free."""
+    """Judge whether a weaker motor shows the mass `seen` [kg]; `joint` is 0 locked, 1 free."""
     plain, weak, strong = loops.apparent[joint]
     part = Part(
         f"with a motor that gives {RATIOS[1]:g} of the force that the drive assumes, it is nearer {seen:g} than the "

@@ -1,4 +1,7 @@
-"""Eq. 1 and 2: joint and pre-sliding friction as springs in series, differentiated, and in the plant."""
+"""Judge Eq. 1 and 2: joint and pre-sliding friction as springs in series.
+
+They are differentiated, and compared with the plant.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,8 @@ PRINTED_STIFFNESS = in_series(K_F, K_J)
 """Eq. 1 as printed."""
 
 PRINTED_SENSITIVITY = (K_J / K_F / (1 + K_J / K_F)) ** 2
-"""Eq. 2 as printed, with eta = K_J/K_F.
-
-It gives the change of the series stiffness with that of the friction."""
+"""Eq. 2 as printed, with eta = K_J/K_F. It gives the change of the series stiffness with the stiffness of the
+friction."""
 
 
 @judges("E1", figure="Eq. 1, 2", needs=(PLANT,))
@@ -35,7 +37,7 @@ def printed_formulas(evidence: Evidence) -> Finding:
 
 @cache
 def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
-    """Return the given formulas, in K_F and K_J, against two springs that carry one force."""
+    """Judge the given formulas, in K_F and K_J, against two springs that carry one force."""
     force, middle, end = sp.symbols("F u x")
     balance = sp.solve([K_F * middle - force, K_J * (end - middle) - force], [middle, end], dict=True)[0]
     derived = sp.simplify(force / balance[end])
@@ -70,8 +72,7 @@ def _written(expression: sp.Basic) -> str:
 
 
 def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
-    """Return a formula for the stiffness, in K_F and K_J,
-    against the plant derived from the declared equations."""
+    """Judge a formula for the stiffness, in K_F and K_J, against the plant of the declared equations."""
     eta = springs.joint / springs.bristles
     expected = float(stiffness.subs({K_F: springs.bristles, K_J: springs.joint}))
     return Part(

@@ -1,4 +1,4 @@
-"""Fig. 13: what the controller's shares do while the stage sticks, at two gaps of the friction forces."""
+"""Judge Fig. 13: the shares of the controller's force while the stage sticks, at two friction gaps."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ STRIBECK_VELOCITY = 1.6e-3
 
 
 TURNING = 0.05
-"""Longest time [s] below the Stribeck velocity that counts as a mere reversal."""
+"""Longest time [s] below the Stribeck velocity that still counts as a mere reversal."""
 
 
 @dataclass(frozen=True)
 class Sticking:
-    """The sticks that end in break-away, each of shape (sticks,).
+    """The sticks that end in break-away, each array of shape (sticks,).
 
-    They have a length [s], the fraction of the integral action in the force at break-away, and its direction (1 or -1).
+    A stick has a length [s], the fraction of the integral action in the force at break-away, and the direction of
+    break-away (1 or -1).
     """
 
     time: np.ndarray
@@ -51,11 +52,11 @@ class Sticking:
 
     @property
     def both(self) -> bool:
-        """Tell whether there is a break-away in both directions."""
+        """Tell whether there are break-aways in both directions."""
         return {1, -1} <= set(self.direction)
 
     def words(self, values: np.ndarray, written: Callable[[float], str]) -> str:
-        """Return the mean, and the means in the two directions, as numbers are `written`."""
+        """Return the overall mean and the means in the two directions as text, formatted by `written`."""
         if not self.both:
             return "no cycle"
         forward, back = (written(float(values[self.direction == direction].mean())) for direction in (1, -1))
@@ -92,10 +93,9 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
 
 
 def sticking(response: Response) -> Sticking:
-    """Return the sticks of a response that end in a break-away after the time from which peaks
-    count.
+    """Return the sticks of a response that end in break-away, after the time from which peaks count.
 
-    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it; the fraction of the
+    A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it. The fraction of the
     integral action is taken where the friction force is largest within the stick, before it drops.
     """
     trace = response.trace

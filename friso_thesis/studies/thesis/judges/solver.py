@@ -1,4 +1,4 @@
-"""Sec. 3.2.3: the solver of the thesis against friso's, on the same runs."""
+"""Compare the solver of the thesis (Sec. 3.2.3) with friso's, on equal runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ CROSSOVERS = (4.0, 8.0, 12.0, 16.0, 20.0)
 """Crossovers [Hz] of runs with the joint locked and free: evenly spread up to where Fig. 11 sees no hunting."""
 
 STROKES, DAMPINGS = (30, 100, 300), (1, 100, 10_000)
-"""Strokes [um] and limiter dampings [N s/m] of more with the joint free, where the limiter is hit: over Fig. 14B."""
+"""Strokes [um] and limiter dampings [N s/m] of further runs with the joint free, which hit the limiter: over Fig.
+14B."""
 
 AT_REST = 1e-9
 """Swing [m] below which a run counts as at rest."""
@@ -73,8 +74,10 @@ def _kept(values: Mapping[str, float], name: str) -> Counted:
 
 @cache
 def own_runs(rtol: float) -> Mapping[str, Counted]:
-    """Return what friso finds at a relative tolerance;
-    a swing of 0 where the stage does not swing at the end."""
+    """Run the cases with friso at a relative tolerance.
+
+    The swing is 0 for a stage that does not swing at the end.
+    """
     return {name: _counted(_run(changes, rtol)) for name, changes in CASES.items()}
 
 
@@ -89,8 +92,7 @@ def _counted(cell: xr.Dataset) -> Counted:
 
 
 def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
-    """Return the finding from runs by name: of ode23s,
-    and of friso at the tight tolerance and at the thesis's."""
+    """Judge runs by name: by ode23s, and by friso at the tight tolerance and at the thesis's."""
     words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]
@@ -137,7 +139,7 @@ def other_solvers(evidence: Evidence) -> Finding:
 
 
 def judged_solvers(values: Mapping[str, float]) -> Finding:
-    """Return the finding from runs by three solvers, as `benchmarks.ode23s.other_solvers` names them."""
+    """Judge runs by three solvers, named as in `benchmarks.ode23s.other_solvers`."""
     words = reading()
     cost = {name: {joint: values[f"{joint}_{name}_evaluations"] for joint in ("locked", "free")} for name in _SOLVERS}
     cheaper = min(cost["ode15s"][joint] / cost["ode23s"][joint] for joint in ("locked", "free"))

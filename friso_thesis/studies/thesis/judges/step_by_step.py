@@ -1,4 +1,4 @@
-"""Sec. 4.1: the steps by which the thesis explains what mass, friction gap and alpha do to hunting."""
+"""Judge the steps by which the thesis explains mass, friction gap and alpha (Sec. 4.1)."""
 
 from __future__ import annotations
 
@@ -32,8 +32,11 @@ NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare.
 
 @dataclass(frozen=True)
 class ArguedCycle:
-    """A motion after the return, as far as the arguments go: the overshoot beyond the reference [m] of a cycle (NaN if
-    there is none), the mean rate [N/s] at which the integral action changes until peaks are counted, and the sticks."""
+    """A motion after the return, reduced to the quantities of the thesis's arguments.
+
+    They are the overshoot beyond the reference [m] of a cycle (NaN if there is none), the mean rate [N/s] at which the
+    integral action changes until peaks are counted, and the sticks.
+    """
 
     overshoot: float
     build_up: float
@@ -41,7 +44,10 @@ class ArguedCycle:
 
 
 def cycle_of(response: Response) -> ArguedCycle:
-    """Return the cycle of a response; its overshoot and sticks are those after the time from which peaks count."""
+    """Return the cycle of a response.
+
+    Overshoot and sticks are taken after the time from which peaks count.
+    """
     trace = response.trace
     time, integral = (np.asarray(trace[name].values) for name in ("time", "force_i"))
     deviation = (trace["position"] - trace["reference"]).values
@@ -60,7 +66,7 @@ def _against(first: float, second: float, unit: str, names: tuple[str, str]) -> 
 
 @judges("S41M", figure="Sec. 4.1, mass step by step", needs=(LIGHT, HEAVIEST))
 def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
-    """Return how fast the integral action changes with a light and with a heavy mass, and how the heavy one ends."""
+    """Judge how fast the integral action changes with a light and a heavy mass, and how the heavy one ends."""
     light, heavy = (cycle_of(evidence.responses[name]) for name in (LIGHT, HEAVIEST))
     counted = int(evidence.responses[HEAVIEST].cell["count"])
     return Finding(
@@ -83,7 +89,7 @@ def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
 
 @judges("S41G", figure="Sec. 4.1, gap and overshoot", needs=(WIDE, NARROW))
 def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
-    """Return overshoot and build-up of the integral at both gaps."""
+    """Judge overshoot and build-up of the integral at both gaps."""
     wide, narrow = (cycle_of(evidence.responses[name]) for name in (WIDE, NARROW))
     undecided = "" if wide.stick.both and narrow.stick.both else NOTHING_TO_COMPARE
     return Finding(
@@ -108,7 +114,7 @@ def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
 
 @judges("S41A", figure="Sec. 4.1, alpha and break-away", needs=(LOW_ALPHA, HIGH_ALPHA))
 def larger_alpha_breaks_away_sooner(evidence: Evidence) -> Finding:
-    """Return the sticks at both ends of the range of alpha."""
+    """Judge the sticks at both ends of the range of alpha."""
     low, high = (cycle_of(evidence.responses[name]).stick for name in (LOW_ALPHA, HIGH_ALPHA))
     undecided = "" if low.both and high.both else NOTHING_TO_COMPARE
     return Finding(
@@ -139,7 +145,7 @@ def _seconds(time: float) -> str:
 
 @judges("F25R", figure="25", needs=("system",), of_runs=True)
 def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
-    """Return the period of lasting cycles over the crossover, at every mass of the map."""
+    """Judge the period of lasting cycles over the crossover, at every mass of the map."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -163,7 +169,7 @@ def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
 
 @judges("S5P", figure="Sec. 5, peaks and cycles", needs=_ISOLATED, of_runs=True)
 def more_peaks_than_cycles(evidence: Evidence) -> Finding:
-    """Return the isolated runs that swing to their end with more counted peaks than cycles."""
+    """Judge the isolated runs that swing to their end with more counted peaks than cycles."""
     swinging, more = 0, 0
     for name in _ISOLATED:
         runs = evidence.maps[name]

@@ -1,4 +1,4 @@
-"""Fig. 14: stiffness of the joint, damping of its limiter, and stroke."""
+"""Judge Fig. 14: stiffness of the joint, damping of its limiter, and stroke."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _NEEDED = 1e-4
 """Stroke [m] that the isolator needs with a strongly damped limiter (Sec. 4.1)."""
 
 _SMALL_DAMPING = 1.0
-"""Limiter damping below which the stroke is reported for comparison [N s/m]."""
+"""Limiter damping [N s/m] below which the stroke is reported for comparison."""
 
 
 @judges("F14A", figure="14A", needs=("isolator-stiffness", "locked"))
 def stiffness_has_a_limit(evidence: Evidence) -> Finding:
-    """Return the stiffness above which the isolated rig keeps moving, at each stroke."""
+    """Judge the stiffness above which the isolated rig keeps moving, at each stroke."""
     words = reading()
     runs = evidence.maps["isolator-stiffness"]
     stiffness, stroke, moving, _ = verdict_table(runs, "joint.stiffness", "joint.stroke")
@@ -67,7 +67,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """Return the cells of stroke 0, compared with the locked rig."""
+    """Judge the cells of stroke 0 against the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["count"].values
@@ -83,8 +83,7 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """Return the stroke from which runs come to rest where the limiter is damped much,
-    and the amplitude."""
+    """Judge the stroke from which runs come to rest with a strongly damped limiter, and the amplitude."""
     words = reading()
     runs, axes = evidence.maps["isolator-damping"], ("joint.stroke", "joint.limiter_damping")
     stroke, damping, moving, _ = verdict_table(runs, *axes)
@@ -126,9 +125,11 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
 
 
 def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
-    """Return where runs keep moving apart from the others,
-    at longer strokes than some at which all come to rest; `moving` is of shape (strokes, dampings)."""
-    rests = np.maximum.accumulate(~moving, axis=0)  # from the first stroke at which they come to rest
+    """Say where runs keep moving in a stripe of their own.
+
+    Its strokes are longer than some at which all runs come to rest. `moving` has the shape (strokes, dampings).
+    """
+    rests = np.maximum.accumulate(~moving, axis=0)  # the first stroke at which they come to rest
     apart = moving & rests
     if not apart.any():
         return ""
@@ -142,7 +143,7 @@ def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
 
 
 def _span(values: np.ndarray) -> str:
-    """Return the least and the greatest of the values, or the one that there is."""
+    """Return the least and the greatest of the values, or a single value."""
     low, high = _rounded(values.min()), _rounded(values.max())
     return low if low == high else f"{low} to {high}"
 
@@ -153,8 +154,7 @@ def _rounded(value: float) -> str:
 
 
 def _by_decade(damping: np.ndarray, needed: np.ndarray) -> FindingTable:
-    """Return the stroke needed [m], shape (n,), over the limiter's damping [N s/m],
-    decade by decade."""
+    """Return a table of the stroke needed [m], (n,), over the limiter's damping [N s/m], by decade."""
     decades = np.floor(np.log10(damping * (1 + 1e-9))).clip(max=np.ceil(np.log10(damping[-1])) - 1)
     rows = []
     for decade in np.unique(decades):

@@ -1,5 +1,4 @@
-"""Analyse the thesis's rig as a linear system: its limit cases,
-its loops and its cart speeds."""
+"""Analyse the thesis's rig as a linear system: its limit cases, its loops and its cart speeds."""
 
 from __future__ import annotations
 
@@ -39,8 +38,11 @@ PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locke
 
 @dataclass(frozen=True)
 class PartNeeded:
-    """A part of the analysis that a judge may name: the tables of the stage file that play no part in it, and whether
-    its joint is locked, which leaves the joint's own damping out."""
+    """A part of the analysis that a judge may name.
+
+    `outside` are the tables of the stage file that do not matter for it. `locked` tells whether its joint is locked, so
+    that the joint's own damping does not matter.
+    """
 
     outside: tuple[str, ...]
     locked: bool = False
@@ -59,9 +61,12 @@ NEEDS: Mapping[str, PartNeeded] = MappingProxyType(
 class Linear:
     """A rig as a linear system.
 
-    Its plant by limit case ("-series" behind the name with the formula that Table 1 prints for a touched limiter), and
-    its springs in a row; its loops with the joint free and locked; its 8 Hz loop over the speed of the cart, and with
-    the masses that the thesis `identified`, the joint free; its loop at 48 Hz with a softer `contact`, locked.
+    - `plants`: by limit case; "-series" after a name marks the formula that Table 1 prints for a touched limiter.
+    - `springs`: in series.
+    - `free`, `locked`: loops by state of the joint.
+    - `speeds`: 8 Hz loop over the speed of the cart.
+    - `identified`: the loop with the masses that the thesis identified, joint free.
+    - `contact`: loop at 48 Hz with a softer contact, locked.
     """
 
     plants: Mapping[str, LimitCase]
@@ -74,8 +79,10 @@ class Linear:
 
 
 def analysed(stage: Stage) -> Linear:
-    """Return the linear analysis of a rig with its joint free; kept,
-    since every reproduction asks for the same rigs."""
+    """Return the linear analysis of a rig with its joint free.
+
+    Results are cached, because every reproduction needs the same rigs.
+    """
     return _analysed(stage.to_toml())
 
 

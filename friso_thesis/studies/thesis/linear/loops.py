@@ -1,4 +1,7 @@
-"""The loops of the rig at the thesis's crossovers, and how fast its controller may be, with and without its drive."""
+"""Compute the loops of the rig at the thesis's crossovers, and how fast its controller may be.
+
+This is done with and without its drive.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from friso.stage import Stage
 from friso.studies.rig.experiments.frf import SETTINGS as MEASURED_SETTINGS
 
 SETTINGS = tuple(8.0 * factor for factor in MEASURED_SETTINGS)
-"""Crossovers [Hz] of Fig. 22: the same of the model as of the rig as built, beside which it is drawn."""
+"""Crossovers [Hz] of Fig. 22, equal for the model and for the measured rig, which are drawn together."""
 
 LIMITS = (48.0, 60.0)
 """Crossovers [Hz] that the thesis calls the highest, of the rig (Sec. 4.2.4) and of the simulation (Sec. 3.4.2)."""
@@ -30,14 +33,14 @@ SAMPLED = "50 us"
 """Sample time of the rig's controller (Sec. 3.5)."""
 
 DELAYS = (0.0, 50e-6, 100e-6, 150e-6, 200e-6, 500e-6, 1e-3)
-"""Delays [s] of drive, encoder and computation, besides the hold, none of which the thesis states: from none over a few
-samples to what a fieldbus takes."""
+"""Delays [s] of drive, encoder and computation, besides the hold. The thesis states none, so they range from zero over
+a few samples to the delay of a fieldbus."""
 
 CURVE = (1.0, 3e3)
 """Frequencies [Hz] over which the loops are drawn."""
 
 POINTS = 600
-"""Number of frequencies of a curve, besides those around resonances."""
+"""Number of frequencies of a curve; more lie around resonances."""
 
 LOWEST, STEPS = 1.0, 61
 """Lowest crossover [Hz] and number of crossovers in the search for the ends of a range."""
@@ -114,13 +117,15 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
-    """Return the crossover [Hz] up to which all limit cases are stable;
-    None at the end of the search, 0 where none is."""
+    """Return the crossover [Hz] up to which all limit cases are stable.
+
+    The result is None at the end of the search, and 0 if there is none.
+    """
     ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0
     return None if end == searched_crossovers(flat)[1] else end
 
 
 def _edge(flat: Mapping[str, Any]) -> float:
-    """Return the delay [s] that some limit case does not bear."""
+    """Return the least delay [s] at which some limit case is unstable."""
     return float(np.min([margins(flat, member).delay_margin for member in limit_cases(flat).values()]))

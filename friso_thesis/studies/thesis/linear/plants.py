@@ -1,4 +1,4 @@
-"""Describe the plant in each limit case, as one reads it off Fig. 7."""
+"""Describe the plant in each limit case by the numbers that one reads off Fig. 7."""
 
 from __future__ import annotations
 
@@ -22,16 +22,19 @@ PARASITIC = 300.0
 """Frequency [Hz] at which the thesis finds the parasitic mode (Sec. 3.4.2)."""
 
 VISIBLE = np.log(10) / 20
-"""Height, in the logarithm of the magnitude, from which a peak counts as a resonance: 1 dB."""
+"""Least height of a resonance peak, in the logarithm of the magnitude: 1 dB."""
 
 FINER = 201
-"""Frequencies between the neighbours of an extreme, for locating it."""
+"""Number of frequencies between the neighbours of an extreme, for locating it."""
 
 
 @dataclass(frozen=True)
 class LimitCase:
-    """Stage position over force in one limit case: its `resonances` and `antiresonances` [Hz], ascending; the `mass`
-    [kg] whose line it follows below the parasitic mode, at `mass_at` [Hz] (both NaN where there is none)."""
+    """Stage position over force in one limit case.
+
+    `resonances` and `antiresonances` [Hz] ascend. `mass` [kg] is the mass whose line the response follows below the
+    parasitic mode, at `mass_at` [Hz]; both are NaN without such a line.
+    """
 
     resonances: tuple[float, ...]
     antiresonances: tuple[float, ...]
@@ -50,15 +53,17 @@ class LimitCase:
 
     @property
     def pair_above(self) -> tuple[float, float] | None:
-        """Return the first antiresonance above the parasitic mode and the resonance that follows it
-        [Hz]; None without."""
+        """Return the first antiresonance above the parasitic mode, and the resonance after it [Hz].
+
+        The result is None without them.
+        """
         pairs = [(z, p) for z in self.antiresonances for p in self.resonances if self.parasitic < z < p]
         return min(pairs, default=None)
 
 
 @dataclass(frozen=True)
 class Springs:
-    """Stiffness [N/m] of the `joint`, of the `bristles` of the cart, and of the plant at rest, which has `both`."""
+    """Stiffness [N/m] of the `joint`, of the cart's `bristles`, and of the plant at rest (`both`)."""
 
     joint: float
     bristles: float
@@ -74,8 +79,10 @@ def springs_of(flat: Mapping[str, Any]) -> Springs:
 
 
 def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
-    """Return all limit cases by name; those with a touched limiter by the formula of Table 1
-    too, with "-series" behind."""
+    """Return all limit cases by name.
+
+    Cases with a touched limiter are also given by the formula of Table 1, with "-series" appended.
+    """
     cases = limit_cases(flat)
     series = limiter_in_series(flat)
     plain = {name: _limit_case(flat, member) for name, member in cases.items()}
@@ -94,7 +101,7 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Return the frequencies [Hz] at which the magnitude peaks, or its inverse for a negative sign."""
+    """Return the frequencies [Hz] at which the magnitude peaks; for a negative sign, its inverse."""
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))
@@ -108,7 +115,10 @@ def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: in
 
 
 def _mass_line(case: LimitCase) -> float:
-    """Return the middle of the mass line [Hz], between the antiresonance of the parasitic mode and lower modes."""
+    """Return the middle of the mass line [Hz].
+
+    It lies between the antiresonance of the parasitic mode and lower modes.
+    """
     high = max((f for f in case.antiresonances if f < case.parasitic), default=np.nan)
     low = max((f for f in case.resonances if f < high), default=high / 10)
     return float(np.sqrt(low * high))

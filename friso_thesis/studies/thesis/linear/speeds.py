@@ -1,4 +1,4 @@
-"""The 8 Hz loop over the speed of the cart, as Fig. 8 prescribes it."""
+"""Compute the 8 Hz loop over the speed of the cart, as Fig. 8 prescribes it."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.settings import FrequencySettings
 
 SPEEDS = 257
-"""Number of speeds at which stability is checked before range ends are located."""
+"""Number of speeds at which stability is checked before the ends of ranges are located."""
 
 CROSSOVERS = 25
-"""Number of faster controllers that are tried on an unstable cart."""
+"""Number of faster controllers that are tried if the cart is unstable."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Speeds:
 
 
 def loop_over_speed(flat: Mapping[str, Any]) -> Speeds:
-    """Return the loop of a stage over the speed of its cart."""
+    """Compute how stability of the loop depends on the speed of the cart."""
     unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
     tenth = 2 * np.pi * flat[CROSSOVER] * np.array([0.1, 10.0])
     size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
@@ -74,7 +74,7 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
-    """Tell whether in the middle of some of the ranges no faster controller is stable."""
+    """Tell whether, in the middle of some range, no faster controller is stable."""
     settings = FrequencySettings.current()
     crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])
@@ -83,10 +83,10 @@ def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
 
 
 def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: float) -> np.ndarray:
-    """Return the real part [1/s] of the rightmost pole of the loop,
-    with friction linearised at speeds (n,) [m/s].
+    """Return the real part [1/s] of the loop's rightmost pole, at speeds (n,) [m/s].
 
-    The bristles have a fraction of the deflection that belongs to these speeds in steady state.
+    Friction is linearised at these speeds, with the bristles at a fraction of the deflection that belongs to the speed
+    in steady state.
     """
     law = law_of(flat)
     assert law is not None  # the rig has friction

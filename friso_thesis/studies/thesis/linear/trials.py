@@ -1,5 +1,4 @@
-"""Try changes that would make the model match the measurements: other masses,
-and a softer contact."""
+"""Try changes that would make the model match the measurements: other masses, a softer contact."""
 
 from __future__ import annotations
 
@@ -31,9 +30,11 @@ LITTLE = "1 N*s/m"
 
 @dataclass(frozen=True)
 class Contact:
-    """A contact of cart and stage so soft, with `stiffness` [N/m], that its mode lies where the further crossing was
-    measured: the loop of the sliding rig, locked at the highest setting, with the rig's limiter damping (`margins`)
-    and with little (`undamped`)."""
+    """A contact of cart and stage so soft that its mode lies at the further crossing that was measured.
+
+    It has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop, locked at the highest setting, with the
+    rig's limiter damping; `undamped` are those with little damping.
+    """
 
     stiffness: float
     margins: Margins
@@ -41,12 +42,15 @@ class Contact:
 
 
 def identified_loop(stage: Stage) -> Margins:
-    """Return the loop of the sliding cart, its joint free, with the masses that were identified."""
+    """Return the margins of the sliding cart, joint free, with the identified masses."""
     return _sliding(stage.replace(dict(IDENTIFIED)))
 
 
 def soft_contact(stage: Stage) -> Contact:
-    """See `Contact`. The part of the stage that its parasitic mode carries hardly takes part in the mode."""
+    """Compute the soft contact (see `Contact`).
+
+    The part of the stage that its parasitic mode carries hardly takes part in the contact's mode.
+    """
     flat = stage.flat()
     reduced = in_series(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
     stiffness = float((2 * np.pi * FURTHER) ** 2 * reduced)
