@@ -179,7 +179,7 @@ class Kernel:
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion with integrals that hold `steady.force` alone, from values of the parameters.
+        """Return states in a steady motion with integrals that hold `steady.force` alone, from parameter values.
 
         The other states add their own force.
         """

@@ -67,7 +67,7 @@ def check_html(
             *filter(None, [conclusion(cases)]),
             *(f"{omitted}." for omitted in [left_out(stage)] if omitted),
             *motion_sentences(stage),
-            *filter(None, [stage.controller.note(stage.flat())]),
+            *filter(None, [stage.controller.note(stage.flat()), stage.note]),
             *([isolator_sentence(isolator)] if isolator else []),
             *(draws_sentences(draws) if draws else []),
             *(laws_sentences(laws) if laws else []),
