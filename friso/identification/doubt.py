@@ -110,9 +110,14 @@ class FitCase(FittedCase):
     """
 
     quality: Quality
-    refused: Mapping[str, str] = field(default_factory=dict)
     leading: LeadingEffect | None = None
     progress: Progress = silent
+
+    @property
+    def refused(self) -> dict[str, str]:
+        """Return why keys are not reported, by key; the first of several reasons counts."""
+        last_first = reversed(self.quality.findings)
+        return {key: why for finding in last_first for key, why in finding.refuses.items()}
 
     @property
     def has_cause(self) -> bool:
@@ -137,8 +142,7 @@ class FitCase(FittedCase):
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
-        fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
-        return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})
+        return replace(self, fit=finding.fit or self.fit, inverse=finding.inverse or self.inverse, quality=quality)
 
 
 @dataclass(frozen=True)

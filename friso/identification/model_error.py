@@ -41,7 +41,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
         case = replace(case, estimates=estimates, correlation=correlation)
     elif not is_free(case.flat):
         case = case.with_answers(RaisedDoubt(answers=_with_model_error(case)))
-    imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.lacks_something else {}
+    imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
     case = case.with_answers(RaisedDoubt(refuses={**case.refused, **imitated}))
     if is_free(case.flat):
         return case
