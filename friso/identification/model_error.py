@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.doubt import KeyCase, RaisedDoubt
-from friso.identification.doubts.coupling import IMITATED
+from friso.identification.doubt import IMITATED, KeyCase, RaisedDoubt
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import BRISTLES, is_free

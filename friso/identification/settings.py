@@ -97,13 +97,6 @@ class DoubtSettings(Settings):
     mass_share_of_a_tried_coupling: float = setting(0.05, "")
     """Force of a tried coupling over inertia. Larger ones are not linear."""
 
-    reach_of_a_coupling: float = setting(2.0, "")
-    """Factor by which intervals exceed the shift of the fit by a coupling. One linear step recovered no more than 60 %
-    of an error of 1.5 %."""
-
-    mass_share_of_a_coupling: float = setting(0.003, "")
-    """Smallest relative shift of the mass by a coupling that is reported."""
-
     share_of_a_tried_load: float = setting(0.02, "")
     """Tried friction in proportion to the motor's force, over that force."""
 
@@ -123,7 +116,8 @@ class DoubtSettings(Settings):
     tenth of the friction and more the right one left 0.01 to 0.84; on sound ones none explained anything."""
 
     reach_of_an_effect: float = setting(2.0, "")
-    """Factor by which intervals exceed the shift of the fit by an effect, which is one linear step."""
+    """Factor by which intervals exceed the shift of the fit by an effect. One linear step recovered at most 60 % of an
+    error of 1.5 % by a coupling, and half (in the logarithm) of the damping that three samples of delay doubled."""
 
     places_of_a_force_along: int = setting(12, "")
     """Places along the way with a separate force or friction, each of which takes a simulated run."""
@@ -174,10 +168,6 @@ class DoubtSettings(Settings):
 
     samples_of_a_tried_delay: float = setting(0.05, "")
     """Tried delay in samples. Larger ones are followed in jumps."""
-
-    reach_of_a_delay: float = setting(2.0, "")
-    """Factor by which intervals exceed the shift of the fit by a delay. One linear step recovered 40 to 50 % (in the
-    logarithm) of the damping of bristles that three samples more than doubled."""
 
     samples_of_a_delay: float = setting(0.25, "")
     """Smallest delay in samples that is reported. Shorter ones are within the hold of the force."""

@@ -78,6 +78,13 @@ def explained_by(
     return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest), left, every)
 
 
+def is_sure_beside_all(fit: OutputErrorFit, force: np.ndarray, unit: float) -> bool:
+    """Tell whether the size of a further force is sure where all numbers of the model may follow, fitted or not."""
+    rest, slopes = beside_all_numbers(fit)
+    explained = explained_by(slopes, rest, effects_of([force], [unit], fit), fit.problem.counted)
+    return explained is not None and explained.is_sure(fit)
+
+
 def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
     """Return what a fit leaves beside all numbers of its model, and the derivatives to these, (n, parameters).
 

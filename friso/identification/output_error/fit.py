@@ -56,7 +56,7 @@ class OutputErrorFit:
     @property
     def fitted(self) -> list[str]:
         """Return the names of the fitted parameters."""
-        return [self.problem.parameters[number].name for number in self.free]
+        return [self.problem.names[number] for number in self.free]
 
     @property
     def bounded(self) -> set[int]:
@@ -109,8 +109,7 @@ class OutputErrorFit:
 
     def value(self, name: str) -> float:
         """Return the value of a parameter in SI units."""
-        names = [parameter.name for parameter in self.problem.parameters]
-        i = names.index(name)
+        i = self.problem.names.index(name)
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 

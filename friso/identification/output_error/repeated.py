@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -57,13 +58,11 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     This is for a stage that followed a log which it does not explain to its noise: a delay passes for damping, times
     the stiffness.
     """
-    names = [parameter.name for parameter in fit.problem.parameters]
-    places = {names[number]: place for place, number in enumerate(fit.free)}
-    if not {"friction.bristle_stiffness", "friction.bristle_damping"} <= places.keys():
+    if not {*BRISTLES} <= {*fit.fitted}:
         return fit
     late = fit.value("friction.bristle_stiffness") * fit.problem.inputs.sample_time
     covariance = fit.covariance.copy()
-    place = places["friction.bristle_damping"]
+    place = fit.fitted.index("friction.bristle_damping")
     covariance[place, place] += (late / fit.value("friction.bristle_damping") / COVERAGE) ** 2
     return replace(fit, covariance=covariance)
 
