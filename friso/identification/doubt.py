@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -24,7 +25,9 @@ from friso.identification.output_error.effects import (
     beside_all_numbers,
     effects_of,
     explained_by,
+    reaching_over,
 )
+from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 from friso.progress import Progress, silent
@@ -33,6 +36,11 @@ from friso.registry import Registry
 if TYPE_CHECKING:
     from friso.identification.output_error.fit import OutputErrorFit
     from friso.identification.quality import Quality
+
+IMITATED = "what the model lacks would pass for it"
+"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
@@ -110,9 +118,14 @@ class FitCase(FittedCase):
     """
 
     quality: Quality
-    refused: Mapping[str, str] = field(default_factory=dict)
     leading: LeadingEffect | None = None
     progress: Progress = silent
+
+    @property
+    def refused(self) -> dict[str, str]:
+        """Return why keys are not reported, by key; the first of several reasons counts."""
+        last_first = reversed(self.quality.findings)
+        return {key: why for finding in last_first for key, why in finding.refuses.items()}
 
     @property
     def has_cause(self) -> bool:
@@ -127,18 +140,39 @@ class FitCase(FittedCase):
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
-    def is_small(self, size: float) -> bool:
-        """Tell whether a force along the way of some size [N] is too small to be told: intervals allow for it."""
+    def led_by(self, doubt: str) -> LeadingEffect | None:
+        """Return the effect that explains most of the residual if it is that of a doubt, and the fit means anything."""
+        describes = not (self.quality.failed or self.quality.rejected)
+        return self.leading if describes and self.leading is not None and self.leading.doubt == doubt else None
+
+    def reaching(self, moved: np.ndarray, further: Mapping[str, float] = NOTHING) -> OutputErrorFit:
+        """Return the fit with intervals that reach over what an effect has `moved`, (free,), and `further` by name."""
+        reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
+        return reaching_over(self.fit, reach + [further.get(name, 0.0) for name in self.fit.fitted])
+
+    def named(
+        self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] = NOTHING
+    ) -> RaisedDoubt:
+        """Return the finding of an effect that explains most of the residual: bristles would bend by it as well."""
+        refuses = dict.fromkeys(BRISTLES, IMITATED)
+        wider = self.reaching(effect.explained.moved, further)
+        return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
+
+    def named_along(
+        self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] = NOTHING
+    ) -> RaisedDoubt:
+        """Return the finding of an effect along the way, of some size [N]; intervals alone allow for a small one."""
+        finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
-        return size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
+        small = size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
+        return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """Return the case with a finding added, and with the finding's consequences for the fit."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
-        fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
-        return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})
+        return replace(self, fit=finding.fit or self.fit, inverse=finding.inverse or self.inverse, quality=quality)
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
 
     The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes.
     """
-    if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
+    if "friction.coulomb" not in fit.problem.names:
         return None
     forces, units, bends = changing_forces(fit, velocity)
     return _drift(explained_by_forces(fit, forces, units), bends)
@@ -115,8 +115,7 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
     """Return the fit with deviations that include the changes, and the shifts of the fit, of both forces."""
     further = np.abs(changes.moved)
-    for i, number in enumerate(fit.free):
-        name = fit.problem.parameters[number].name
+    for i, name in enumerate(fit.fitted):
         if name == "friction.coulomb":
             further[i] += changes.friction_reach / fit.value(name)
         elif name.startswith("bias."):
@@ -136,7 +135,7 @@ def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseMode
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield friction and a constant force that change along the record."""
-    if "friction.coulomb" in [parameter.name for parameter in case.fit.problem.parameters]:
+    if "friction.coulomb" in case.fit.problem.names:
         yield TriedForces(*changing_forces(case.fit, case.velocity)[:2])
 
 

@@ -6,15 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubt import IMITATED, Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import motion
-from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.output_error.effects import explained_by_forces, is_sure_beside_all
 from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
 from friso.identification.settings import DoubtSettings
 from friso.quantities import percent
-
-IMITATED = "what the model lacks would pass for it"
-"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -23,21 +20,20 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
     motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If the
     position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times that
-    derivative.
+    derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then.
     """
     fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
     if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
         return
-    explained = explained_by_forces(fit, [force], [settings.mass_share_of_a_tried_coupling])
+    unit = settings.mass_share_of_a_tried_coupling
+    explained = explained_by_forces(fit, [force], [unit])
     if explained is None:
         return
-    moved, (load,) = explained.moved, explained.sizes
-    names = [fit.problem.parameters[number].name for number in fit.free]
-    share = -float(np.expm1(moved[names.index(MASS)]))
-    further = reaching_over(fit, settings.reach_of_a_coupling * np.abs(moved))
-    if share * load <= 0 or abs(share) < settings.mass_share_of_a_coupling:
+    lighter, further = -float(explained.moved[fit.fitted.index(MASS)]), case.reaching(explained.moved)
+    if lighter * explained.sizes[0] <= 0 or not is_sure_beside_all(fit, force, unit):
         yield RaisedDoubt(fit=further)
         return
+    share = -float(np.expm1(-lighter))
     words = _sentence(share) if case.may_name("coupling") else ""  # an averaged motion makes such a force too
     yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
@@ -48,7 +44,7 @@ def coupling_force(case: FittedCase) -> np.ndarray | None:
     Returns None if no mass is fitted, or the stage does not move.
     """
     fit, step = case.fit, case.log.sample_time
-    if MASS not in [fit.problem.parameters[number].name for number in fit.free]:
+    if MASS not in fit.fitted:
         return None
     cutoff = DoubtSettings.current().bandwidths_of_a_coupling * case.inverse.bandwidth
     acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
