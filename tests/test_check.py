@@ -237,7 +237,7 @@ def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved()
 def test_what_the_stage_file_notes_is_repeated(rig: Stage, checked: CheckAnswer) -> None:
     noted = rig.replace({"note": "The controller is a placeholder."})
     assert noted.to_toml() != rig.to_toml()
-    answer = CheckAnswer(checked.result, stage=friso.loads(noted.to_toml()))
+    answer = CheckAnswer(checked.result, stage=friso.loads(noted.to_toml()), draws=None, laws=None, cut=False)
     assert noted.note in answer.sentences()
     assert noted.note not in checked.sentences()
 
