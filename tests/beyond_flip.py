@@ -26,7 +26,7 @@ CREEPING = VARIANTS["rigid"].replace(
 LIGHT = VARIANTS["rigid"].replace(
     {"masses": {"cart": "1 g", "stage": "0.5 g"}, "controller.crossover": "34.45 Hz", "controller.tuned_mass": "1.5 g"}
 )
-"""Of a gram and a half, beyond the flip of its symmetric cycle."""
+"""A stage of a gram and a half, beyond the flip of its symmetric cycle."""
 
 STEEP = Stage(
     masses={"cart": "0.148062 kg", "stage": "0.0299594 kg"},
@@ -49,5 +49,5 @@ STEEP = Stage(
     },
     motion={"kind": "release", "duration": "20 s", "displacement": "0.00128738 m"},
 )
-"""At 0.135 of its bandwidth its symmetric cycle flips; the return map turns steeply 3 % beside that, and keeps
-irregular swings beyond the flip."""
+"""A stage whose symmetric cycle flips at 0.135 of its bandwidth. The return map turns steeply 3 % beside the cycle, and
+keeps irregular swings beyond the flip."""

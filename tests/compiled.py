@@ -14,7 +14,7 @@ from friso.engine.vector_code import vector_llvm
 
 @cache
 def function(original: Callable[..., Any], lanes: int, numbers: int) -> Any:
-    """The compiled function of a buffer's address and so many numbers."""
+    """Return a compiled function of a buffer's address and `numbers` numbers."""
     return at_address(load_object(object_code(vector_llvm({"run": original}, lanes)), ["run"])["run"], numbers)
 
 
@@ -36,7 +36,7 @@ def step(kernel: Kernel, buffer: np.ndarray, *numbers: float) -> int:
 
 
 def in_all(original: Callable[..., Any], rows: np.ndarray, *numbers: float, lanes: int = 8) -> np.ndarray:
-    """What straight-line code makes of the columns of an array of shape (rows, n), so many of them at a time."""
+    """Apply straight-line code to the columns of an array (rows, n), `lanes` columns at a time."""
     count = rows.shape[1]
     result = np.pad(rows, ((0, 0), (0, -count % lanes)), mode="edge")
     for first in range(0, result.shape[1], lanes):

@@ -58,7 +58,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """What is imported by now stays: looking through it for garbage, again and again, takes a twentieth of the time."""
+    """Exclude all present imports from garbage collection, which would take a twentieth of the time."""
     gc.freeze()
     gc.set_threshold(20_000, 20, 10)
 
@@ -111,7 +111,7 @@ def drawn_here() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def unhurried() -> Iterator[None]:
-    """What commands say does not depend on how long they take: no lines of progress."""
+    """Suppress lines of progress, so that what commands say does not depend on how long they take."""
     from friso.cli import progress
 
     with patched({progress: {"LINES": TIMEOUT_MAX}}):
@@ -128,13 +128,13 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures that are files are empty: what is tested is beside them."""
+    """Leave image files empty, for tests of everything else."""
     monkeypatch.setattr("friso.shown.drawing.matplotlib_renderer.image", lambda *_, **__: b"")
 
 
 @pytest.fixture(scope="session")
 def snapshots(pytestconfig: pytest.Config) -> Snapshots:
-    """What commands say, kept in tests/snapshots."""
+    """Return the stored texts of commands, in tests/snapshots."""
     return Snapshots(bool(pytestconfig.getoption("--refresh-snapshots")))
 
 
@@ -146,5 +146,5 @@ def refused(request: pytest.FixtureRequest, snapshots: Snapshots) -> Refused:
 
 @pytest.fixture
 def wording(refused: Refused) -> Wording:
-    """What this test's warnings, reasons and sentences say: kept with the messages."""
+    """Return a check of this test's warnings, reasons and sentences, stored with the messages."""
     return refused.says

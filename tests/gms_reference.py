@@ -39,7 +39,7 @@ class Elements:
         return float(np.sum(forces + self.damping / self.stiffness * rates) + self.flat["friction.viscous"] * v)
 
     def lacking(self, n: int, forces: np.ndarray, v: float, way: float) -> float:
-        """What an element that sticks bears less than its share of the level, along the motion [N]."""
+        """Return by how much the force of a sticking element along the motion is below its share of the level [N]."""
         return float(self.share[n] * self.level(v) - way * forces[n])
 
 
@@ -92,6 +92,6 @@ class Loop:
 
 
 def _event(function: Callable[..., float]) -> Any:
-    """One that ends the run where the function falls through 0."""
+    """Return an event that ends the run where the function falls through 0."""
     function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
     return function

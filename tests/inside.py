@@ -28,7 +28,7 @@ def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProces
 
 
 def command_of(name: str) -> Callable[..., None]:
-    """The command of a question as a function: what it is asked about, then its options as keywords."""
+    """Return the command of a question as a function: subjects first, then options as keywords."""
     question = QUESTIONS[name]
 
     def command(*about: Any, **options: Any) -> None:

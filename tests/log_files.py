@@ -53,8 +53,11 @@ def write_twincat(
     end_mark: bool = True,
     full: bool = True,
 ) -> Path:
-    """As Scope 3.4 exports: groups of (sample time [ms], channels (name, unit, values)), each with a time column in
-    ms, or in 100 ns since 1601 from `start` on; `full` adds the rows of keys under the names."""
+    """Write a log as Scope 3.4 exports it.
+
+    Groups are (sample time [ms], channels (name, unit, values)), each with a time column in ms, or in 100 ns since 1601
+    from `start` on; `full` adds the rows of keys under the names.
+    """
     rows: list[list[str]] = [["Name", "rig"], ["File", "rig.csv"]]
     rows += [["Starttime of export", "132959733843760000", "Montag, 2. Mai 2022", "15:56:24.376"]] * full + [[], []]
 

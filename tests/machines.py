@@ -29,7 +29,7 @@ MOVES = ((0.2, 1.0), (1.2, -1.0), (2.4, 0.5), (3.4, -0.5), (4.6, 0.2), (5.6, -0.
 """Times [s] at which moves begin, and their speeds over the highest: quick ones, and slow ones that may hunt."""
 
 CREEP_TIME = 15.0
-"""Of a slow ramp [s]."""
+"""Duration of a slow ramp [s]."""
 
 PULLS = (1e-3, 3e-3, 1e-2)
 """Speeds [m/s] of the references that pull a stage until it breaks away."""
@@ -44,8 +44,11 @@ steps of the reference per sample of the log."""
 
 @dataclass(frozen=True)
 class Machine:
-    """A stage as it is, with the deviations of its noise and the steps of its digits for lengths [m] and forces [N],
-    the time between its samples [s], and the source of its noise."""
+    """A true stage with its measurement errors.
+
+    They are the standard deviations of noise and the steps of digits for lengths [m] and forces [N], the sample time
+    [s], and the source of noise.
+    """
 
     truth: friso.Stage
     length_noise: float
@@ -65,7 +68,7 @@ class Machine:
 
     @property
     def guess(self) -> friso.Stage:
-        """What its owner knows of it: its structure, its controller, how its mass is shared; not how much friction."""
+        """Return what the owner knows: structure, controller and mass ratio, but not the friction."""
         flat = self.flat
         coulomb = 0.6 * flat["friction.coulomb"]
         numbers = {key: 1.3 * flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
@@ -100,7 +103,7 @@ class Machine:
         return self.measured(record(name, self.sample_time, **{k: v[::FINE] for k, v in signals.items()}), bare)
 
     def measured(self, log: Log, bare: bool = False) -> Log:
-        """A log with noise and digits; the reference is known as it is."""
+        """Return a log with noise and digits; the reference is exact."""
         signals = {
             role: values if bare or role in ("reference", "disturbance") else self._digits(values, role == "force")
             for role, values in log.signals.items()

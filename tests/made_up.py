@@ -59,7 +59,7 @@ def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunt
 
 
 def hunts(**changes: Any) -> Judgement:
-    """What is known of the thesis rig, locked."""
+    """Return a judgement like that of the thesis rig, locked."""
     result = Judgement(
         "hunts",
         fake_hunting(fake_cycle()),
@@ -72,7 +72,7 @@ def hunts(**changes: Any) -> Judgement:
 
 
 def settles(**changes: Any) -> Judgement:
-    """What is known of it, free."""
+    """Return a judgement like that of the thesis rig, free."""
     edge = Margin(0.6998, 5.598, True, 0.7064)
     result = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
     return replace(result, **changes)
@@ -84,7 +84,7 @@ def cannot_hunt(verdict: Any = "settles") -> Judgement:
 
 @dataclass(frozen=True)
 class FakeCase:
-    """What `friso.hunting.Case` promises (contract of the check)."""
+    """A stand-in with the attributes that `friso.hunting.Case` promises."""
 
     stage: Any
     trace: xr.Dataset | None
@@ -256,6 +256,6 @@ def same(left: list[list[np.ndarray]], right: list[list[np.ndarray]]) -> bool:
 
 
 def digests() -> list[str]:
-    """Of a figure in all formats, and of a page of several."""
+    """Return digests of a figure in all formats, and of a page with several."""
     images = [matplotlib_renderer.image(small_figure(), form) for form in matplotlib_renderer.FORMATS]
     return [hashlib.sha256(content).hexdigest() for content in (*images, check_html(both_joints()).encode())]

@@ -34,12 +34,12 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        """All words in one piece."""
+        """Return all words of the page as one text."""
         return "".join(self.words)
 
     @property
     def lines(self) -> str:
-        """The same without blank lines and white space about others."""
+        """Return the page's text without blank lines and surrounding white space."""
         rows = (" ".join(row.split()) for row in self.text.splitlines())
         return "\n".join(row for row in rows if row)
 

@@ -31,7 +31,7 @@ def reference(flat: Flat, t: float) -> tuple[float, float, float]:
 
 
 def _stroke(a: float, ramp: float, t: float) -> tuple[float, float, float]:
-    """Accelerate at a for the time `ramp`, brake likewise, stay."""
+    """Return a step of the reference: accelerate at a for the time `ramp`, brake for as long, stay."""
     if t <= 0:
         return 0.0, 0.0, 0.0
     if t < ramp:
@@ -94,7 +94,7 @@ def _profile(flat: Flat, t: float) -> tuple[float, float, float]:
 
 
 def under_conditions(flat: Flat, acceleration: float) -> Flat:
-    """With static and Coulomb friction as the conditions have them (no rail)."""
+    """Return the flat keys with static and Coulomb friction under the conditions (no rail)."""
     if "conditions.load" not in flat:
         return flat
     get = {name.removeprefix("conditions."): value for name, value in flat.items() if name.startswith("conditions.")}
@@ -148,7 +148,7 @@ def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
 
 
 def generalised_elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
-    """The same of elements that slip towards their share of a Stribeck curve."""
+    """Return force and rates of elements that slip towards their share of a Stribeck curve."""
     level, pull = stribeck_level(flat, v), flat["friction.attraction"]
     force, rate, number = flat["friction.viscous"] * v, {}, 1
     while (name := f"deflection_{number}") in s:
@@ -166,7 +166,7 @@ def generalised_elements(flat: Flat, v: float, s: State) -> tuple[float, dict[st
 def cascade(
     flat: Flat, s: State, error: float, v: float, y: float, r_rate: float, r_bend: float
 ) -> tuple[float, dict[str, float]]:
-    """The same of a position loop over a velocity loop, with the limit of the force."""
+    """Return force and rates of a position loop over a velocity loop, with the force limit."""
     keys = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
     rates: dict[str, float] = {}
     if keys["velocity_filter"] > 0:

@@ -8,7 +8,7 @@ MASS, DRAG, KP, KI, TIME = 2.0, 3.0, 4000.0, 9000.0, 1e-3
 
 
 def plain_axis(kd: float, limit: float, motion: dict[str, str], **drive: Any) -> Stage:
-    """With bristles far too soft to be felt."""
+    """Return an axis whose bristles are too soft to matter."""
     friction = {
         "model": "lugre",
         "static": "1 N",

@@ -1,4 +1,4 @@
-"""Messages, which tests/snapshots/messages.txt keeps: those of inputs that are refused, by which key, and others."""
+"""Check messages, such as those of refused inputs by key, against tests/snapshots/messages.txt."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from snapshots import Snapshots, masked
 from friso.errors import InputError
 
 Wording = Callable[[str], None]
-"""Compares the next text of a test with what is kept of it."""
+"""Function that compares the next text of a test with the stored one."""
 
 
 @dataclass
@@ -27,14 +27,14 @@ class Refused:
     def __call__(
         self, key: str | None = None, kind: type[InputError] = InputError
     ) -> Iterator[pytest.ExceptionInfo[InputError]]:
-        """What is done within ends in an error of this kind, about this key."""
+        """Check that the block ends in an error of this kind, about this key."""
         with pytest.raises(kind) as caught:
             yield caught
         assert key in (None, caught.value.key)
         self.says(str(caught.value))
 
     def says(self, message: str) -> None:
-        """Compare the next message with what is kept."""
+        """Compare the next message with the stored one."""
         self.count += 1
         number = f" ({self.count})" if self.count > 1 else ""
         self.snapshots.check("messages", masked(self.test).strip() + number, message)

@@ -1,8 +1,8 @@
-"""Machines drawn at random with their drives as built, and the way of their rig's logs through files: the known truth
-that the loop from `friso rig` through `friso identify` is tried on, in test and benchmark.
+"""Draw machines with their real drives at random, and pass their rig's logs through files.
 
-Mass, stiffness and friction are those of machines.py. Sizes that the thesis's rig has besides are scaled with them, in
-the structure of examples/thesis_drive.toml: one set of kernels does for all.
+They are the known truth for tests and benchmarks of the way from `friso rig` to `friso identify`. Mass, stiffness and
+friction are those of machines.py. Further sizes of the thesis's rig are scaled with them, in the structure of
+examples/thesis_drive.toml, so that all share one set of kernels.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def through_files(logs: Iterable[RigLog], folder: Path) -> list[LogFile]:
 
 
 def sources(logs: Iterable[LogFile]) -> list[tuple[Source, str]]:
-    """What `identify` takes."""
+    """Return the logs as sources for `identify`."""
     return [(item.source, item.kind) for item in logs]
 
 

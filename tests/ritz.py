@@ -27,7 +27,10 @@ class Plate(NamedTuple):
     amplitudes: np.ndarray
 
     def clamp_stress(self, eta: ArrayLike) -> np.ndarray:
-        """Bending stress at the clamp over that of a beam with the same deflection; eta from -1 to 1 across."""
+        """Return the bending stress at the clamp over that of a beam of equal deflection.
+
+        eta runs from -1 to 1 across the leaf.
+        """
         eta = np.asarray(eta, dtype=float)
         curvature = _derived(self.along[0], 1.0, 2) * np.ones_like(eta)
         k = 0
@@ -40,7 +43,7 @@ class Plate(NamedTuple):
 
 
 def plate(length: float, width: float, poisson: float, along: int = ALONG, across: int = ACROSS) -> Plate:
-    """The plate with so many functions along and across."""
+    """Return the plate with `along` functions along it and `across` functions across it."""
     bubble = legendre.poly2leg([1, 0, -2, 0, 1])
     cubic = legendre.poly2leg([0, 1.5, 0, -0.5])
     inner = [legendre.legmul(bubble, legendre.Legendre.basis(2 * i + 1).coef) for i in range(along)]
@@ -61,7 +64,10 @@ def plate(length: float, width: float, poisson: float, along: int = ALONG, acros
 
 
 def _curvatures(f: np.ndarray, g: np.ndarray, a: float, b: float) -> np.ndarray:
-    """Those along, across and of twist of the product f(x) g(y), at the points, shape (3, points x, points y)."""
+    """Return curvatures along, across and of twist of the product f(x) g(y).
+
+    They are given at the points, shape (3, points x, points y).
+    """
     x = [_derived(f, _X, d) * a**d for d in range(3)]
     y = [_derived(g, _Y, d) * b**d for d in range(3)]
     return np.array([np.outer(x[2], y[0]), np.outer(x[0], y[2]), np.outer(x[1], y[1])])

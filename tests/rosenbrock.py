@@ -45,7 +45,10 @@ def step(
     t: float,
     h: float,
 ) -> Step:
-    """One step of length h from x at time t; `jacobian` is df/dx and `drift` df/dt there."""
+    """Take one step of length h from x at time t.
+
+    `jacobian` is df/dx and `drift` df/dt there.
+    """
     x, h = x.astype(Real), Real(h)
     matrix = np.eye(x.size, dtype=Real) / (Real(method.gamma) * h) - jacobian
     k: list[np.ndarray] = []

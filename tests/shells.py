@@ -23,7 +23,7 @@ CROWDING, STRESS_CROWDING = 0.5, 0.8  # of the nodes at the ends and free edges:
 
 
 class Sheet(NamedTuple):
-    """What leaves are cut from: SI."""
+    """Material and thickness of the leaves, in SI."""
 
     length: float
     width: float
@@ -34,7 +34,10 @@ class Sheet(NamedTuple):
 
 
 class Leaf(NamedTuple):
-    """One leaf meshed; nodes run along y first: those of the clamp come first, those of the stage last."""
+    """One meshed leaf.
+
+    Nodes run along y first; nodes of the clamp come first, nodes of the stage last.
+    """
 
     nodes: np.ndarray  # (n, 3) [m]
     elements: list[Quad4]
@@ -82,7 +85,7 @@ def leaf_mesh(sheet: Sheet, mesh: Mesh, deflection: float = 0.0, crowding: float
 
 
 def divisions(count: int, crowding: float) -> np.ndarray:
-    """From 0 to 1 in `count` steps, shorter at both ends."""
+    """Return values from 0 to 1 in `count` steps, shorter at both ends."""
     even = np.linspace(0, 1, count + 1)
     return (1 - crowding) * even + crowding * np.sin(np.pi / 2 * even) ** 2
 
@@ -125,7 +128,7 @@ def matrix(filled: tuple[np.ndarray, np.ndarray, np.ndarray], nodes: np.ndarray)
 
 
 def follow(leaf: Leaf) -> np.ndarray:
-    """Motion of all unknowns of the leaf (6n, 6) with that of the middle of its edge, in equilibrium."""
+    """Return the motion of all unknowns of the leaf (6n, 6) per motion of its edge's middle, in equilibrium."""
     moved = np.zeros((DOF * len(leaf.nodes), 6))
     moved[leaf.edge] = leaf.rigid
     k = leaf.stiffness
@@ -146,7 +149,7 @@ def mechanism_stiffness(
 
 
 def places(leaves: int, spacing: float) -> list[np.ndarray]:
-    """How the middles of the leaves' edges move with the stage, (6, 6) each."""
+    """Return how the middles of the leaves' edges move with the stage, (6, 6) each."""
     return [rigid_motion(np.array([[0, 0, z]])) for z in spacing * (np.arange(leaves) - (leaves - 1) / 2)]
 
 
@@ -173,7 +176,7 @@ def coupled(part: csc_matrix, leaf: Leaf, shifts: list[np.ndarray], body: np.nda
 
 
 def start(matrix: csc_matrix) -> np.ndarray:
-    """The same vector for the eigenvalues of a matrix every time."""
+    """Return a start vector for the eigenvalues of a matrix, equal every time."""
     return np.random.default_rng(0).standard_normal(len(matrix.indptr) - 1)
 
 
@@ -206,8 +209,11 @@ def modes(
 
 
 def kind(shares: np.ndarray, inner: np.ndarray, leaf: Leaf) -> str:
-    """What moves, with the half waves along leaves: from the shares (6,) of the stage's coordinates in the kinetic
-    energy, and the inner unknowns of all leaves."""
+    """Return which part a mode moves, with the half waves along leaves.
+
+    It follows from the fractions (6,) of the kinetic energy in the stage's coordinates, and from the inner unknowns of
+    all leaves.
+    """
     if np.sum(shares) > 0.5:
         return f"stage {('ux', 'uy', 'uz', 'rx', 'ry', 'rz')[int(np.argmax(shares))]}"
     across = len(leaf.rigid) // DOF

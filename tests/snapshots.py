@@ -1,8 +1,8 @@
-"""What commands say, kept in files: words and layout of a text exactly, its numbers as far as processors agree.
+"""Compare what commands say with stored texts: words and layout exactly, numbers as processors agree.
 
-A file holds the texts of one command by name. `pytest --refresh-snapshots` writes those that differ. A text is kept as
-it was, but for folders, times, versions and numerical errors, which are masked; numbers are compared to 2 %, or to
-their last decimal; white space and the length of lines of a table are not.
+A file holds the texts of one command by name. `pytest --refresh-snapshots` writes those that differ. Folders, times,
+versions and numerical errors are masked. Numbers are compared to 2 %, or to their last decimal; white space and the
+length of lines of a table are not compared.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Snapshots:
     refresh: bool = False
 
     def check(self, command: str, name: str, text: str) -> None:
-        """Compare what a command says under a name with what is kept."""
+        """Compare what a command says with the text stored under a name."""
         path, now = FOLDER / f"{command}.txt", masked(text)
         kept = read(path).get(name, "")
         if alike(kept, now):

@@ -40,7 +40,7 @@ def test_work_is_counted_by_steps_and_what_they_compute(locked: Stage) -> None:
 
 
 def test_work_is_counted_alike_on_every_processor(locked: Stage) -> None:
-    """As if eight runs were done side by side, however many this processor does."""
+    """Work counts as if eight runs were done side by side, whatever the processor does."""
     work = kernel(structure(locked.flat())).work
     with allowance() as single:
         (steps,) = runs_of(locked, 1)
@@ -48,8 +48,10 @@ def test_work_is_counted_alike_on_every_processor(locked: Stage) -> None:
 
 
 def test_a_step_is_as_dear_as_the_operations_in_it() -> None:
-    """Of one more state, of a bristle, and of deviations beside all states; by the source alone, so that it does not
-    depend on the machine."""
+    """One more state, a bristle, and deviations beside all states make a step dearer.
+
+    The source alone decides, so that the result does not depend on the machine.
+    """
     rigid, free = (kernel(structure(VARIANTS[name].flat())) for name in ("rigid", "free"))
     variational = kernel(structure(VARIANTS["rigid"].flat()), variational=True)
     bare = replace(

@@ -1,4 +1,4 @@
-"""The server of `friso app`: whom it lets in, what it takes, and that its answers are those of friso."""
+"""Test the server of `friso app`: whom it lets in, what it accepts, and that its answers are friso's."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Served:
     def ask(
         self, question: str, stage: Path, changes: dict[str, Any] | None = None, pinned: bool = False, **options: Any
     ) -> list[Any]:
-        """The parts of an answer; the stage as it is may be `pinned`."""
+        """Return the parts of an answer; the stage as it is may be `pinned`."""
         machine = {"name": stage.name, "text": stage.read_text(encoding="utf-8")}
         body = {"machine": {**machine, "changes": changes or {}}, "pinned": machine if pinned else None}
         body |= {"options": options, "page": "test", "lane": question}
@@ -442,7 +442,7 @@ def test_a_hostile_log_is_refused_and_the_server_goes_on(
 
 
 def identify_logs(folder: Path, log: bytes) -> None:
-    """What the command line does with a log that is elsewhere."""
+    """Do what the command line does with a log in another folder."""
     (folder / "elsewhere").mkdir()
     (folder / "elsewhere" / "mine.csv").write_bytes(log)
     friso.identify(folder / "elsewhere" / "mine.csv")
@@ -648,7 +648,7 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
 
 
 def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Served) -> None:
-    """Then how fast the controller may be, which takes longer; all of it is what friso says."""
+    """The family comes next, and then how fast the controller may be, which takes longer; friso says all of it."""
     answer = friso.bode(RIG)
     first, family, words = (part for part in served.ask("bode", RIG) if part["kind"] != "message")
     drawn = [[figure["name"] for figure in part["figures"]] for part in (first, family)]
@@ -843,7 +843,7 @@ UNSTABLE = {"controller.alpha": 0.99, "controller.beta": 1, "controller.crossove
 
 
 def test_an_answer_is_there_at_once_for_whoever_comes_back_with_what_was_noted() -> None:
-    """The last of each kind; of other options it is another one, and what was overtaken is none."""
+    """The latest answer of each kind is kept; other options make another answer, and an overtaken one is none."""
     asked: list[tuple[Any, ...]] = []
 
     def question(stage: Any, *, draws: int = 0, progress: Any) -> Any:
@@ -882,7 +882,7 @@ def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Serv
 
 
 def test_what_is_compiled_is_told_to_those_that_wait_for_it_and_to_nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To each of them once, whoever began; another browser asks for something else meanwhile."""
+    """Each waiting browser hears of it once, whoever began; another one asks for something else meanwhile."""
     request, built = CodeRequest("shared", "a kernel of both", "no_builder", b"told to whom"), threading.Event()
     monkeypatch.setattr(building._Job, "_built", lambda job: str(built.wait(60)))
     monkeypatch.setattr(CodeRequest, "answer", lambda request, name: None)
@@ -972,7 +972,7 @@ def test_at_the_end_answers_end_before_what_computes_notices() -> None:
 
 
 def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
-    """Others that use the same server in this process have their errors all the same, after it."""
+    """Requests by others to the same server in this process still get their errors afterwards."""
 
     async def ended() -> None:
         with listening("127.0.0.1", 0) as listener:
@@ -998,7 +998,10 @@ def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pyte
 
 
 def test_a_browser_that_disconnects_ends_what_it_asked(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At once, though nothing is being sent: Starlette listens for it with servers of ASGI up to 2.3 alone."""
+    """A request ends at once although nothing is being sent.
+
+    Starlette listens for a disconnect only with ASGI up to 2.3.
+    """
     begun, ended, given_up = threading.Event(), threading.Event(), threading.Event()
 
     def job(asked: Any, work: Work) -> Iterator[dict[str, Any]]:
@@ -1083,7 +1086,7 @@ def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> N
 
 
 def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its own threads do not, and nobody waits for what takes long."""
+    """The threads of the work that goes first do not wait, and nobody waits for slow work."""
     monkeypatch.setattr("friso.engine.overtaken.AHEAD", 60.0)
     order = []
 
@@ -1111,7 +1114,7 @@ def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monke
 
 
 def test_a_question_goes_first_until_its_picture_is_there() -> None:
-    """What it computes after that waits for the picture of another one, as all work does."""
+    """Work after the picture waits for another question's picture, as all work does."""
     firsts: list[bool] = []
 
     def job(_: Work) -> Iterator[dict[str, Any]]:
@@ -1125,7 +1128,7 @@ def test_a_question_goes_first_until_its_picture_is_there() -> None:
 
 
 def test_a_sweep_whose_blocks_are_in_flight_is_overtaken() -> None:
-    """By the flag alone: no progress is reported meanwhile, and the block ends only once it is told to."""
+    """The flag alone overtakes it: no progress is reported, and the block ends only when it has to."""
     flag = np.zeros(1, np.int64)
     stage = friso.load(STICK_SLIP)
     study = Request(stage, {"masses.stage": ["1 kg", "1.1 kg"]}).study(None, 1e-6)

@@ -91,7 +91,7 @@ class Browsed:
             page.unroute("**/ask/machine")
 
     def changes(self) -> dict[str, Any]:
-        """What is changed of the machine that is shown."""
+        """Return the changed keys of the machine shown."""
         return self.page.evaluate("async () => (await import('/state.js')).changes()")
 
     def answered(self, text: str) -> None:
@@ -101,7 +101,7 @@ class Browsed:
         )
 
     def begin(self) -> None:
-        """The rig alone, as it was opened, whatever the test before did or left undone."""
+        """Show the rig alone, as it was opened, whatever the previous test left."""
         page = self.page
         page.unroute_all(behavior="ignoreErrors")
         page.context.set_offline(False)
@@ -144,7 +144,7 @@ class Browsed:
 
 @cache
 def first_sentence(crossover: str) -> str:
-    """Of the whole answer about the rig with this crossover."""
+    """Return the first sentence of the whole answer about the rig with this crossover."""
     return friso.check(RIG, set={"controller.crossover": crossover}).sentences()[0]
 
 
@@ -206,7 +206,7 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
 
 
 def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
-    """Where the new one takes longer than a moment: a kernel may have to be compiled."""
+    """An old verdict is marked if the new one takes longer than a moment, because of a kernel to compile."""
     page, held = browsed.page, []
     page.wait_for_selector("#answer .rest .note")
     assert page.locator("#answer .old").count() == 0
@@ -226,7 +226,7 @@ def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
 
 
 def test_a_picture_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
-    """Where the new one takes longer than a moment, or never comes: the server may be gone."""
+    """An old picture is marked if the new one takes longer than a moment, or never comes because the server is gone."""
     page, held = browsed.page, []
     page.wait_for_selector("#picture .figure:not(.old, [inert])")
     page.route("**/ask/run", lambda route: held.append(route))
@@ -238,7 +238,7 @@ def test_a_picture_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
 
 
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
-    """Those below what is in sight are drawn after the others, when the machine may have changed."""
+    """Plots below the visible part are drawn later, when the machine may have changed."""
     page = browsed.page
     old = page.evaluate(
         """async () => {
@@ -286,7 +286,7 @@ def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_the
 
 
 def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
-    """Progress does not take its place; the whole answer says itself what is true of the machine."""
+    """Progress does not replace it; the whole answer says what is true of the machine."""
     page = browsed.page
     browsed.check("9.5 Hz")
     said = page.inner_text("#answer")
@@ -311,7 +311,7 @@ def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) ->
 
 
 def test_the_pictures_of_an_answer_that_is_there_are_not_asked_for_again(browsed: Browsed) -> None:
-    """How probable hunting is took minutes, which another check would take away."""
+    """Another check would take away the probability of hunting, which took minutes."""
     page, asked = browsed.page, []
     browsed.check("9.5 Hz")
     page.on("request", lambda request: asked.append(request.url))
@@ -349,7 +349,7 @@ def test_a_refusal_is_said_while_something_else_is_typed(browsed: Browsed) -> No
 
 
 def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
-    """What is drawn anew while the pointer is pressed is drawn once it has clicked; what has the focus keeps it."""
+    """Parts that are redrawn while the pointer is pressed are redrawn after the click; the focus stays."""
     page = browsed.page
 
     def click(place: str) -> None:
@@ -440,7 +440,7 @@ def test_machines_are_closed_by_keys_and_the_last_one_stays(browsed: Browsed) ->
 
 
 def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
-    """With the keys of that time and no others, and in its tab."""
+    """The machine returns with the keys of that time and no others, in its own tab."""
     page = browsed.page
     page.evaluate("document.getElementById('history').replaceChildren()")
     page.evaluate("async () => (await import('/state.js')).set({ 'controller.crossover': '11 Hz' })")
@@ -540,7 +540,7 @@ def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
 
 
 def test_a_slider_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
-    """What is right again does not take the slider from under the hand, and one pull is one step."""
+    """A corrected value does not take the slider from under the hand, and one pull is one step."""
     page, row = browsed.page, '[data-path="controller.crossover"]'
     browsed.type("controller.crossover", "3 kg")
     page.wait_for_selector(f"{row} .wrong")
@@ -645,7 +645,7 @@ COVERED = """() => {
     const covered = (title) => !entries.every((entry) => apart(entry, title));
     return [entries.length, boxes(".xtitle, .xtick").filter(covered).length];
 }"""
-"""How many entries a legend has, and how many titles and numbers of its axis they cover."""
+"""Script that counts the entries of a legend, and the titles and axis numbers that they cover."""
 
 
 def test_places_on_a_map_are_seen_in_the_dark_and_its_legend_covers_nothing_once_resized(browsed: Browsed) -> None:
@@ -706,7 +706,7 @@ def test_a_picture_that_is_waited_for_says_so(browsed: Browsed) -> None:
 
 
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
-    """Its text can be mended on the page."""
+    """The refused file's text can be corrected on the page."""
     page = browsed.page
     (tmp_path / "wrong.toml").write_text(RIG.read_text().replace('"8 Hz"', '"8 kg"'))
     page.set_input_files("#file", tmp_path / "wrong.toml")
@@ -759,7 +759,7 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
 
 
 def test_the_drawing_of_the_leaf_springs_goes_with_its_picture(browsed: Browsed) -> None:
-    """It stands in the page: what has an address of its own (blob:) is kept for as long as the page is there."""
+    """The drawing is part of the page: an address of its own (blob:) would be kept as long as the page."""
     page = browsed.page
     text = Path(friso.example("thesis_leaves")).read_text(encoding="utf-8")
     page.evaluate("async text => (await import('/state.js')).add('leaves.toml', text)", text)
@@ -777,7 +777,7 @@ def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> N
 
 
 def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Browsed, tmp_path: Path) -> None:
-    """What is then asked is what the command line is given; a refusal names the file as it was dropped."""
+    """The page then asks for what the command line is given; a refusal names the dropped file."""
     page, moved = browsed.page, motion()
     columns = [np.asarray(moved[n]) for n in ("time", "position", "force")]
     write_text(tmp_path / "mute.csv", ["a", "b", "c"], [columns[0], columns[1] * 1000, columns[2]])
@@ -845,7 +845,7 @@ def test_a_log_that_is_refused_can_be_removed(browsed: Browsed, tmp_path: Path) 
 
 
 def test_out_holds_the_machine_that_is_shown_or_waits_for_it(browsed: Browsed, tmp_path: Path) -> None:
-    """Where the server has not read what was typed last, there is no stage file of it yet."""
+    """No stage file is offered as long as the server has not read the last input."""
     page, held = browsed.page, []
     page.route("**/ask/machine", lambda route: held.append(route))
     with page.expect_request(re.compile("ask/machine")):
@@ -928,7 +928,7 @@ KEPT = "JSON.parse(localStorage.getItem(`friso-machines-${sessionStorage.friso}`
 
 
 def test_a_browser_whose_storage_is_full_is_said_so(browsed: Browsed) -> None:
-    """What other tabs kept goes first; where that is not enough, it stays."""
+    """Data of other tabs are removed first; if that is not enough, the message stays."""
     page = browsed.page
     try:
         page.evaluate("""() => {
@@ -974,7 +974,7 @@ def test_of_very_many_changes_the_last_can_be_undone(browsed: Browsed) -> None:
 
 
 def test_a_tab_that_is_opened_from_another_keeps_its_own(browsed: Browsed) -> None:
-    """It begins as a copy, the mark by which it keeps what it has included."""
+    """A copied tab begins with the mark by which the first tab keeps its data."""
     page = browsed.page
     set_key = "async ([key, value]) => (await import('/state.js')).set({ [key]: value })"
     now = "async () => (await import('/state.js')).changes()"
@@ -1017,7 +1017,7 @@ def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> Non
 
 
 def test_a_link_that_is_clicked_on_another_site_is_opened(browsed: Browsed) -> None:
-    """In a tab of its own, of which the server has never heard: the browser is let in, and its machine is shown."""
+    """The link opens in a new tab, unknown to the server: the browser is let in, and its machine is shown."""
     page = browsed.page
     link = page.evaluate("async () => (await import('/state.js')).link()")
     other = page.context.new_page()
@@ -1034,7 +1034,7 @@ def test_a_link_that_is_clicked_on_another_site_is_opened(browsed: Browsed) -> N
 
 
 def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) -> None:
-    """And is let in with it, the page that was there as well; the token leaves the address."""
+    """With the address the browser is let in, and so is the page that was open; the token leaves the address."""
     context = browsed.page.context.browser.new_context()
     try:
         page = context.new_page()
@@ -1068,7 +1068,7 @@ def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: B
 
 
 def test_out_gives_the_lines_of_the_picture_that_is_shown(browsed: Browsed) -> None:
-    """Of one that has no answer yet, and of logs, those of the answer above."""
+    """For a picture without an answer, and for logs, the lines are those of the answer above."""
     page = browsed.page
 
     def line() -> str:
@@ -1122,7 +1122,7 @@ def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
 
 
 def test_a_page_of_files_is_drawn_for_its_width_and_axe_finds_no_violation(browsed: Browsed, tmp_path: Path) -> None:
-    """As every command writes it: with tables and texts that scroll."""
+    """The page has tables and texts that scroll, as every command writes them."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", INK) for k in range(4))
     figure = Figure("f", "Lines", "", (Panel("A title", Axis("x", ""), Axis("y", ""), lines),))
@@ -1179,5 +1179,5 @@ def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
 
 
 def test_nothing_went_wrong_and_nothing_left_this_machine(opened: Browsed) -> None:
-    """At the end of this file."""
+    """Check the errors and requests of the whole file; this test runs last."""
     assert (opened.wrong, opened.outside) == ([], [])

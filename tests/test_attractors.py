@@ -85,7 +85,7 @@ LONG_WAIT = VARIANTS["free, parasitic"].replace(
 """Beside a cycle of 7 s that repels, one of 57 s: the stage springs far, and waits nearly at its reference."""
 
 DAMPED = VARIANTS["rigid"].replace({"controller.alpha": 0.4, "controller.crossover": "8 Hz"})
-"""With much phase lead: the symmetric cycle attracts, and creeps through its reversals."""
+"""With much phase lead the symmetric cycle attracts, and creeps through its reversals."""
 
 HUNTING = {  # stage, release that hunts [m], amplitude [m], period [s]
     "long wait": (LONG_WAIT, 16.6e-3, 22.3e-3, 56.6),
@@ -106,7 +106,7 @@ def attractors_of(name: str) -> Attractors:
 
 @pytest.mark.parametrize("name", HUNTING)
 def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
-    """Amplitudes and periods are those of simulations at two tolerances (see the next test), to 1 %."""
+    """Amplitudes and periods agree to 1 % with simulations at two tolerances (see the next test)."""
     _, _, amplitude, period = HUNTING[name]
     (motion,) = attractors_of(name).motions
     assert motion.amplitude == pytest.approx(amplitude, rel=0.01)
@@ -127,7 +127,7 @@ def test_releases_swing_on(name: str, rtol: float) -> None:
 
 @pytest.mark.parametrize("name", HUNTING)
 def test_many_stages_at_once_tell_the_same(name: str) -> None:
-    """The survey of many stages, which begins from fewer states, tells what attracts as well."""
+    """A survey of many stages, which begins from fewer states, finds the attractors as well."""
     chosen, _, amplitude, _ = HUNTING[name]
     stages = held(chosen)
     attracted = attractors(stages.take(np.zeros(2, np.int64)))
@@ -146,8 +146,11 @@ def test_a_basin_narrower_than_starts_are_apart(crossover: str, hunts: bool) -> 
 
 
 def test_irregular_swings_are_tried_again_from_where_they_were_seen() -> None:
-    """They swing on at 1e-6 and 1e-9, and in SciPy (0.8303 mm). None of the starts that are tried at 1e-9 otherwise
-    leads to them, which was taken for a verdict that depends on the tolerance: "settles", not certain."""
+    """Irregular swings continue at 1e-6 and 1e-9, and in SciPy (0.8303 mm).
+
+    No other start tried at 1e-9 leads to them. That was taken for a verdict that depends on the tolerance: "settles",
+    not certain.
+    """
     changes = {
         "masses": {"cart": "2.6322114 kg", "stage": "0.080878316 kg"},
         "friction.static": "27.786525 N",
@@ -177,7 +180,7 @@ def test_a_stage_that_settles_from_everywhere() -> None:
 
 
 def test_the_period_of_a_doubled_orbit_is_told_by_its_swings() -> None:
-    """At 12.66 Hz the creeping stage goes to and fro every 2.07 s, and repeats itself after twice that."""
+    """At 12.66 Hz the creeping stage swings every 2.07 s, and repeats itself after twice that."""
     attracted = attractors(held(CREEPING.replace({"controller.crossover": "12.6553 Hz"})))
     assert {motion.swings for motion in attracted.motions} == {4}
     for motion in attracted.motions:
@@ -210,7 +213,7 @@ def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
-    """Stuck at 0.77 mm or so it swings on at 13.026 Hz, and comes to rest at 13.029 Hz."""
+    """Stuck at about 0.77 mm it keeps swinging at 13.026 Hz, and comes to rest at 13.029 Hz."""
     starts = 0.7703e-3 * np.linspace(0.9975, 1.0025, 11)
     for crossover, hunts in ((13.026, True), (13.029, False)):
         flat = CREEPING.replace({"controller.crossover": f"{crossover} Hz"}).flat()
@@ -220,7 +223,7 @@ def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
 
 
 def test_many_stages_at_once_are_judged_alike_where_basins_are_narrow() -> None:
-    """From 12.95 Hz on the symmetric cycle of the creeping stage attracts from less than 0.25 % about its distance."""
+    """From 12.95 Hz on, the creeping stage's symmetric cycle attracts from less than 0.25 % about its distance."""
     flat, crossovers = CREEPING.flat(), np.array([12.6553, 12.9, 12.955, 12.98, 13.02, 13.04])
     several = {**flat, "controller.crossover": crossovers * flat["controller.crossover"] / 12.3332}
     assert list(judge_many(several, len(crossovers), 1e-6) == "bistable") == [True] * 5 + [False]
@@ -326,8 +329,10 @@ def test_an_orbit_that_is_lost_while_it_attracts_well_ends_about_there() -> None
 def test_an_end_that_no_orbit_can_be_followed_to_is_certain_between_two_bandwidths(
     number: int, series: str, at: float
 ) -> None:
-    """One orbit is lost at its limiter, of a multiplier near -1; beyond the other irregular swings last a little
-    farther. Refuted by none of the starts of `benchmarks.truth --seed 2901`."""
+    """One orbit is lost at its limiter, with a multiplier near -1; beyond the other one, irregular swings remain.
+
+    No start of `benchmarks.truth --seed 2901` refutes it.
+    """
     flat = draw(2901, number, series).flat()
     outward = EdgeSearch(flat, 10.0)
     end = outward.end(at, what_attracts(outward._stages(np.array([at]))).motions, 1.12 * at)
@@ -393,7 +398,7 @@ def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles() -> N
 def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
     decided: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What simulations beyond an end could not decide stays undecided where nothing else attracts."""
+    """If simulations beyond an end could not decide, and nothing else attracts there, it stays undecided."""
     nothing = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})))
     seen = replace(nothing, decided=np.array([decided]))
     monkeypatch.setattr("friso.hunting.outward.attractors", lambda *_, **__: seen)
@@ -422,12 +427,12 @@ UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
 
 
 UPPER = 39.5987
-"""Where that begins [Hz]: a fold, by `friso boundary`."""
+"""Bandwidth [Hz] at which the upper window begins: a fold, by `friso boundary`."""
 
 
 @pytest.mark.thorough
 def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
-    """From both windows, and from the gap between them."""
+    """The search starts from both windows, and from the gap between them."""
     for crossover, attracting in ((8.0, True), (20.0, False), (60.0, True)):
         sought = search_bandwidths(UNWOUND.replace({"controller.crossover": f"{crossover} Hz"}), attracting)
         ends = [end for window in sought.windows for end in (window.low, window.high) if end is not None]
@@ -505,8 +510,7 @@ def with_little_gap(static: str) -> Stage:
 
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_swing_of_ten_minutes_is_seen() -> None:
-    """With static friction 0.5 % above the Coulomb friction the stage waits for five minutes at 2 mm, and swings on for
-    ever."""
+    """With static friction 0.5 % above Coulomb friction the stage waits five minutes at 2 mm, and keeps swinging."""
     judgement = friso.check(with_little_gap("403 N"))["given"].judgement
     assert judgement.verdict == "hunts"
     assert judgement.cycle is not None
@@ -515,7 +519,7 @@ def test_a_swing_of_ten_minutes_is_seen() -> None:
 
 
 def test_swings_that_are_smaller_than_is_looked_for_leave_a_doubt() -> None:
-    """With 0.05 %, swings of an hour might go on that are not resolved: the motion is followed for many of them."""
+    """With 0.05 %, swings of an hour could exist unresolved: the motion is followed for many of them."""
     judgement = friso.check(with_little_gap("401.2 N"))["given"].judgement
     assert not judgement.hunting.certain
     assert judgement.followed is not None
@@ -524,7 +528,7 @@ def test_swings_that_are_smaller_than_is_looked_for_leave_a_doubt() -> None:
 
 @pytest.mark.parametrize(("series", "seed", "number"), [("stages", 6101, 8), ("machines", 5201, 26)])
 def test_a_fall_of_friction_too_slow_to_feed_a_cycle_leaves_no_doubt(series: str, seed: int, number: int) -> None:
-    """By 0.06 and 0.13 %, over speeds at which a cycle would be a hundred times as large as these could feed."""
+    """Friction falls by 0.06 and 0.13 %, over speeds of a cycle a hundred times larger than it could feed."""
     assert hunting(draw(seed, number, series)).certain
 
 
@@ -539,8 +543,10 @@ SMALL_SWINGS = {  # static and Coulomb friction, Stribeck velocity, exponent, cr
 @pytest.mark.parametrize("thorough", [True, False])
 @pytest.mark.parametrize("name", SMALL_SWINGS)
 def test_swings_of_half_a_percent_of_the_deflection(name: str, thorough: bool) -> None:
-    """Where friction falls but slowly with speed, cycles are far smaller than the deflection of the loop: sizes by
-    brute force, from 16 starts followed for 60 000 s at 1e-8."""
+    """If friction falls slowly with speed, cycles are far smaller than the deflection of the loop.
+
+    Sizes come from brute force: 16 starts followed for 60 000 s at 1e-8.
+    """
     static, coulomb, velocity, exponent, crossover, amplitude = SMALL_SWINGS[name]
     stage = VARIANTS["rigid"].replace(
         {
@@ -559,8 +565,10 @@ def test_swings_of_half_a_percent_of_the_deflection(name: str, thorough: bool) -
 
 
 def test_a_small_swing_about_home_is_not_rest() -> None:
-    """A stage that shakes within what its bristles yield, by a sixtieth of the deflection of the loop, was told to
-    settle, for certain. The size is of simulations of 20 s at 1e-9 and 1e-11."""
+    """A stage that shakes within its bristles' yield was said to settle, for certain.
+
+    The swing is a sixtieth of the deflection of the loop; its size comes from simulations of 20 s at 1e-9 and 1e-11.
+    """
     friction = {
         "static": "0.187335 N",
         "coulomb": "0.107987 N",
@@ -604,8 +612,11 @@ SOFT_ELEMENT = VARIANTS["rigid"].replace(
 
 @pytest.mark.parametrize(("crossover", "amplitude"), [("12 Hz", 0.8907e-3), ("10 Hz", 1.2043e-3)])
 def test_of_several_bristles_some_remember_how_a_stage_came_to_stick(crossover: str, amplitude: float) -> None:
-    """No start with the bristles relaxed comes to this swing: it was told to settle, for certain. Simulated, too, drawn
-    to where it sticks from the reference, and from there on, at a tighter tolerance."""
+    """No start with relaxed bristles leads to this swing: the stage was said to settle, for certain.
+
+    It is also simulated after being drawn from the reference to where it sticks, and from there on at a tighter
+    tolerance.
+    """
     stages = held(SOFT_ELEMENT.replace({"controller.crossover": crossover}))
     surveys = [attractors(stages, thorough=thorough, cycles=False) for thorough in (False, True)]
     assert all(survey.decided for survey in surveys)
@@ -766,7 +777,7 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
 
 
 def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_rest() -> None:
-    """The same stage: released from 12.09817 mm it swings as far, but every 1215 s, with pauses of 940 s."""
+    """Released from 12.09817 mm, the stage swings as far, but every 1215 s, with pauses of 940 s."""
     seldom = asymmetric_stage().replace({"motion.displacement": "12.09817 mm"})
     target = attractors(held(seldom), thorough=True).target.take(0)
     ends, completed, swing = ends_in(seldom.flat(), 1, target)
@@ -810,7 +821,7 @@ UNWINDING = {"controller.anti_windup": "none", "controller.crossover": "20 Hz"}
 
 
 def test_many_stages_are_judged_no_more_surely_than_one() -> None:
-    """At 500 kN no motion that is tried reaches the limit for long, but farther ones do, and may grow."""
+    """At 500 kN no motion tried reaches the limit for long, but farther ones do, and may grow."""
     stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "500 kN"})
     result = hunting(stage)
     assert (result.certain, result.reason) == (False, FARTHER_KICKS)
@@ -825,7 +836,7 @@ def test_many_stages_are_judged_no_more_surely_than_one() -> None:
 
 
 def test_a_stage_that_large_motions_run_away_of_settles_for_certain_from_smaller_ones() -> None:
-    """At 50 N they do: every start that is tried comes to rest or runs away, and the farthest all run away."""
+    """At 50 N every start tried comes to rest or runs away, and the farthest all run away."""
     stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "50 N"})
     with patched({verdict: {"search_bandwidths": lambda *_: NOT_SOUGHT}}):
         case = check_given(stage)
@@ -867,8 +878,10 @@ def test_a_large_swing_that_dies_out_slowly_does_not_attract() -> None:
 
 
 def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_followed_on_either_side() -> None:
-    """Also where they repeat themselves after twice its time, as they do beside one whose multiplier is below -1; of
-    many those spread over three quarters of the way to the farthest."""
+    """Such runs are also followed if they repeat after two periods, as near a multiplier below -1.
+
+    Of many, those spread over three quarters of the way to the farthest are followed.
+    """
     beside = np.array([1e-5, 2e-2, 1e-4, 6e-3, 1e-3, 1e-2, -1e-5, -3e-2, -2.8e-2, -2.4e-2, -2e-2, -1e-2, -9e-3, -8e-3])
     others = np.array([3.0, 3.01, 0.5])
     size, time = np.append(1 + beside, others), np.where(np.arange(17) % 2, 2.0, 1.0)
@@ -889,8 +902,10 @@ def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_follow
 
 
 def test_an_orbit_beside_the_edge_of_a_window_beyond_which_a_controller_pushes_is_closed() -> None:
-    """Its flow has no derivative there: the push holds the stage at the edge of its window, as a relay does, and the
-    orbit, by the equations linearised, repels. Runs come to it to within 1e-13."""
+    """An orbit along the edge of a window has no derivative: the push holds the stage there as a relay does.
+
+    By the linearised equations the orbit is unstable. Runs come to it to within 1e-13.
+    """
     survey = attractors(Ensemble.held(draw(5101, 6, "axes").flat(), 1), thorough=True)
     (motion,) = survey.motions
     assert survey.decided.all()
@@ -911,7 +926,7 @@ def test_a_motion_that_anti_windup_holds_far_out_is_not_said_to_run_away_for_goo
 
 
 def test_a_stage_without_steps_left_is_unknown_and_stops_no_other(rig: Stage) -> None:
-    """Of many stages searched at once one may have used up its steps before another wave of runs begins."""
+    """In a search of many stages one may use up its steps before another wave of runs begins."""
     stages = Ensemble.held(rig.variants()["locked"].flat(), 1)
     so_far, begun = Survey(np.zeros(1, bool), True, 1e-6), starts.Starts(stages)
     begun.stuck_at(stages.length[:, None])

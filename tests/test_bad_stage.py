@@ -483,7 +483,7 @@ def test_changes(changes: dict[str, object], fragments: list[str]) -> None:
 
 
 def test_a_controller_in_another_form_replaces_that_of_the_file() -> None:
-    """As friso's own choice in a stage that was identified is replaced by the gains of the machine."""
+    """For example, friso's own choice in an identified stage is replaced by the machine's gains."""
     stage = loads(RIG).replace({"controller.kp": "3 N/m", "controller.force_limit": "5 N"})
     assert stage.as_written()["controller"] == {"kind": "pid", "kp": "3 N/m", "force_limit": "5 N"}
     assert loads(RIG).replace({"controller.crossover": "9 Hz"}).flat()["controller.crossover"] == 9

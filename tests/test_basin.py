@@ -1,4 +1,4 @@
-"""What starts hunting, and how far off its edge is: against runs of single stages, and against one another."""
+"""Test the starts of hunting and the distance of its edge, against single runs and each other."""
 
 from functools import cache
 from typing import Any
@@ -54,14 +54,14 @@ def rigid(crossover: float) -> Stage:
 
 @cache
 def cycle() -> Cycle:
-    """Its cycle at 8 Hz, 0.52 mm and 1.63 s, which attracts."""
+    """Return the stable cycle of the rig at 8 Hz: 0.52 mm and 1.63 s."""
     (result,) = hunting(rigid(8)).attracting
     return result
 
 
 @cache
 def target() -> Target:
-    """What motions end in there: this cycle."""
+    """Return the motion that marks a run in this cycle."""
     result = hunting(rigid(8)).target
     assert result is not None
     return result
@@ -86,7 +86,7 @@ def hunts(chosen: Stage) -> bool:
 @pytest.mark.inner
 @RIGID
 def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
-    """At the very end of a window of kicks; not a hundredth beside it."""
+    """A verdict is uncertain at the very end of a window of kicks, and certain a hundredth beside it."""
     window = windows().windows[0]
     low, high = 0.98 * window[1], 1.02 * window[1]
     for _ in range(4):
@@ -105,9 +105,9 @@ def released(displacement: float) -> Stage:
 
 @RIGID
 def test_displacements_that_start_hunting() -> None:
-    """At 8 Hz three windows: 1.7 to 11.1 mm, 23.2 to 43.7 mm, and from 60.5 mm on, as far as was searched.
+    """At 8 Hz there are three windows: 1.7 to 11.1 mm, 23.2 to 43.7 mm, and from 60.5 mm to the end searched.
 
-    The stage lands near enough to its reference to rest after a first swing, or a second, from the gaps between them.
+    From the gaps between them, the stage lands near enough to its reference to rest after a first or second swing.
     """
     bands = windows()
     ends = [1e3 * end for window in bands.windows for end in window]
@@ -171,7 +171,7 @@ MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 @pytest.mark.inner
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
-    """The same draws each time: the same numbers."""
+    """Equal draws give equal numbers."""
     first, second = moves_that_hunt(MOVING, target()), moves_that_hunt(MOVING, target())
     assert first is not None
     assert first == second
@@ -185,7 +185,7 @@ def test_share_of_moves_is_reproducible() -> None:
 @RIGID
 @pytest.mark.parametrize("kind", ["release", "there and back"])
 def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: str) -> None:
-    """It is followed on from its state after the last corner; so far within the tolerance of both."""
+    """The run is continued from its state after the last corner, within the tolerance of both."""
     flat = (released(2e-3) if kind == "release" else MOVING).flat()
     form = Ensemble.held(flat, 1).kernel
     first, rest = float(last_corner(flat)) + 0.7, 2.3
@@ -203,7 +203,7 @@ def test_a_run_that_goes_on_where_its_reference_stands_is_the_whole_run(kind: st
 @pytest.mark.inner
 @RIGID
 def test_moves_by_single_runs() -> None:
-    """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
+    """The count equals that of single runs of the draws; eight of them, hunting and resting, are simulated."""
     result = moves_that_hunt(MOVING, target())
     assert result is not None
     drawn = qmc.scale(evenly(MOVES).T, *zip(*result.ranges.values(), strict=True))
@@ -237,8 +237,10 @@ def test_motions_without_acceleration_have_no_share() -> None:
 
 @given(drawn=st.integers(1, 500), data=st.data())
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
-    """Clopper and Pearson 1934: at its lower end so many hits or more have a probability of 2.5 %, at its upper end so
-    many or fewer."""
+    """At its lower end, so many hits or more have a probability of 2.5 %, at its upper end, so many or fewer.
+
+    Clopper and Pearson 1934.
+    """
     hunting = data.draw(st.integers(0, drawn))
     result = MoveShare(drawn, hunting, {})
     low, high = result.interval
@@ -255,7 +257,7 @@ def equal_gains(crossover: float) -> Stage:
 @GAINS
 @pytest.mark.thorough
 def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
-    """The states of the controller differ, what it does not: the same cycle, the same margin."""
+    """The states of the controllers differ, their effect does not: equal cycle, equal margin."""
     chosen = equal_gains(8)
     (result,) = hunting(chosen).cycles
     assert result.period == pytest.approx(cycle().period, rel=1e-7)
@@ -271,7 +273,7 @@ def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
 
 @GAINS
 def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() -> None:
-    """All poles and zeros scaled, and the crossover with them: kp by the square, ki by the cube, kd once, tau back."""
+    """All poles, zeros and the crossover are scaled: kp by the square, ki by the cube, kd once, tau inversely."""
     scaled, wanted = faster(equal_gains(8).flat(), np.array(1.25)), equal_gains(10).flat()
     for name in ("kp", "ki", "kd", "tau"):
         assert float(scaled[f"controller.{name}"]) == pytest.approx(wanted[f"controller.{name}"], rel=1e-12)
@@ -281,7 +283,7 @@ def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() 
     "chosen", [pytest.param(rigid(8), marks=RIGID), pytest.param(equal_gains(8), marks=GAINS)], ids=["tuned", "gains"]
 )
 def test_cycle_attracts_up_to_the_margin_and_not_beyond(chosen: Stage) -> None:
-    """At 0.98 times the factor a cycle attracts, at 1.02 times none does; by hunting(), from stage files."""
+    """At 0.98 times the factor a cycle attracts, at 1.02 times none does; tested by hunting(), from stage files."""
     edge = find_margin(chosen, attracting=True)
     assert edge is not None
     for share, attracting in ((0.98, 1), (1.02, 0)):
@@ -299,7 +301,7 @@ def at(chosen: Stage, factor: float) -> Stage:
 @pytest.mark.inner
 @RIGID
 def test_an_edge_just_before_the_lowest_bandwidth_that_attracts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Within what it is known to: it was searched for among the bandwidths up to it, of which there are none then."""
+    """The search up to the edge, within its error, then contains no bandwidth at all."""
     monkeypatch.setattr(EdgeSearch, "end", lambda _, at, *others: AttractionEnd(0.9999 * at, 1.01 * at, True))
     edge = find_margin(rigid(38), attracting=False)
     assert edge is not None

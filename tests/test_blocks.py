@@ -33,7 +33,7 @@ BLOCKS: dict[str, Callable[[Blocks, Signal], Signal]] = {
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
-    """What is held becomes at a sample what it is in the same motion a sample later."""
+    """At each sample, held numbers become those of the motion one sample later."""
     blocks = Sampled(3)
     signal = BLOCKS[name](blocks, loop_signals(GOING, sp.S.One, sp.S.One).position)
     _, held = blocks.finished(Demand({}, signal, signal, signal), None, Rest())

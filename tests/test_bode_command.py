@@ -1,4 +1,4 @@
-"""`friso bode` as a user runs it: what it computes, says, draws and refuses."""
+"""Test `friso bode` as a user runs it: what it computes, says, draws and refuses."""
 
 import json
 import os

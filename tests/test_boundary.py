@@ -28,7 +28,7 @@ CROSSOVER = KeyRange("controller.crossover", 1.0, 40.0, unit="Hz")
 
 @pytest.fixture(scope="module")
 def over_crossover() -> Diagram:
-    """Of one rigid mass of 1.7 kg with the friction of Table 2, as in references.md."""
+    """Return the diagram of one rigid mass of 1.7 kg with the friction of Table 2, as in references.md."""
     return diagram(Space.of(RIGID, [CROSSOVER]))
 
 
@@ -55,7 +55,7 @@ def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Di
 
 @pytest.mark.inner
 def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) -> None:
-    """It is as uncertain as they differ; at another place, or of another cycle, it is another point."""
+    """The error of a merged point is the difference; points at another place, or of another cycle, stay separate."""
     (_, fold), *_ = special(over_crossover, symmetric=True)["fold"]
 
     def moved(place: float, time: float = 0.0) -> LocatedPoint:
@@ -82,7 +82,7 @@ def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) 
     ],
 )
 def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, value: float, percent: float) -> None:
-    """But where the range holds 0; on a line at an angle to the key it is longer."""
+    """The step differs only if the range contains 0; on a line at an angle to the key the step is longer."""
     space = Space.of(RIGID, [swept, KeyRange("n", 1.0, 1000.0)])
     place = float(swept.place(np.array(value)))
     assert swept.at(np.array(place + swept.hundredth(place))) - value == pytest.approx(
@@ -94,8 +94,11 @@ def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, valu
 
 @pytest.mark.inner
 def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> None:
-    """Straight lines through values that scatter: the reserve mostly holds the true place; what is not known within
-    half of the range is not told. Of three crossings the last is told, as uncertain as they are apart."""
+    """Straight lines through scattered values: the reserve usually holds the true place.
+
+    A place that is not known within half of the range is not returned. Of three crossings the last is returned, with an
+    error as large as their distance.
+    """
     draws, places = np.random.default_rng(0), np.linspace(-0.01, 0.01, 8)
     for scatter in (4e-4, 2e-3, 4e-3):
         true = draws.uniform(-2e-3, 2e-3, 300)
@@ -126,7 +129,10 @@ def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
 
 
 def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_crossover: Diagram) -> None:
-    """There cycles repel so little that runs may stay on them: hunting ends at the flip, however verdicts alternate."""
+    """Near a flip, cycles are so weakly unstable that runs may stay on them.
+
+    Hunting ends at the flip, whatever the simulated verdicts are.
+    """
     (first,) = [change for change in stability_changes(over_crossover) if not change.begins]
     (flip,) = [
         spot
@@ -167,7 +173,7 @@ def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagra
 
 @pytest.mark.thorough
 def test_errors_are_honest(over_crossover: Diagram) -> None:
-    """A diagram at a hundredth of the tolerance has its points within a few of the errors told."""
+    """A diagram at a hundredth of the tolerance has its points within a few of the stated errors."""
     tight = diagram(Space.of(RIGID, [CROSSOVER]), rtol=1e-11)
     for symmetric in (True, False):
         for kind, points in special(over_crossover, symmetric).items():
@@ -207,7 +213,7 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
 @pytest.mark.inner
 @pytest.mark.parametrize("poison", [np.nan, 0.0, 1.0, 1e6])
 def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: float) -> None:
-    """From 9.6 Hz to the flip, with one to begin with that is none, singular, or of something else."""
+    """The walk runs from 9.6 Hz to the flip, with a Jacobian that is missing, singular, or wrong."""
     space = over_crossover.space
     place = float(CROSSOVER.place(np.array(9.6)))
     stages = space.stages(np.array([[place]]))
@@ -271,7 +277,7 @@ def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> Non
 
 
 def test_curves_in_two_keys_pass_through_the_points_in_one(over_friction: Plane) -> None:
-    """At 1 N of Coulomb friction: folds and flips of the diagram over static friction lie on the curves."""
+    """At 1 N of Coulomb friction, folds and flips over static friction lie on the curves."""
     static = KeyRange("friction.static", 1.0, 6.0, unit="N")
     single = diagram(Space.of(AT_8_HZ.replace({"friction.coulomb": "1 N"}), [static]))
     for kind, points in special(single, symmetric=True).items():
@@ -295,7 +301,7 @@ def at_1_n(plane: Plane, curve: Any) -> list[float]:
 
 @pytest.mark.inner
 def test_multipliers_on_a_grid_and_the_curve_agree_within_a_cell(over_friction: Plane) -> None:
-    """Of the symmetric cycle, whether it attracts or not."""
+    """The multipliers of the symmetric cycle say whether it attracts."""
     static, coulomb = np.meshgrid(np.linspace(1.0, 6.0, 21), np.linspace(0.3, 2.5, 21), indexing="ij")
     falls = static > coulomb
     flat = {**AT_8_HZ.flat(), "friction.static": static[falls], "friction.coulomb": coulomb[falls]}
@@ -317,7 +323,7 @@ def refined(points: np.ndarray) -> np.ndarray:
 
 
 def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:
-    """Unequal friction unfolds the pitchfork: what was a flip of the half period is a fold of the whole one."""
+    """Unequal friction unfolds the pitchfork: the flip of the half period becomes a fold of the whole one."""
     traced = diagram(
         Space.of(RIGID.replace({"friction.asymmetry": 0.005}), [KeyRange("controller.crossover", 8.0, 11.0)]), seeds=5
     )
@@ -333,8 +339,10 @@ def test_a_range_without_a_boundary_has_no_points() -> None:
 
 
 def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
-    """With back-calculation: released from up to 1 m it rests at 38 Hz and swings on at 40 Hz (test_attractors.py). No
-    cycle of the return map attracts there."""
+    """With back-calculation, it rests at 38 Hz and swings at 40 Hz, released from up to 1 m (test_attractors.py).
+
+    No cycle of the return map attracts there.
+    """
     unwound = VARIANTS["rigid, limit, back-calculation"].replace(
         {"controller.force_limit": "12 N", "controller.anti_windup_time": "50 ms"}
     )

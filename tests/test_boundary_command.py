@@ -1,4 +1,4 @@
-"""`friso boundary` as a user runs it: what it finds, says, draws and refuses."""
+"""Test `friso boundary` as a user runs it: what it finds, says, draws and refuses."""
 
 import json
 import subprocess
@@ -389,7 +389,10 @@ def test_the_answer_tells_in_three_digits_where_a_curve_runs(crossing: Plane) ->
 
 
 def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane, wording: Wording) -> None:
-    """On a curve, or between two stages; along the second key where it does not along the first; else corners tell."""
+    """Hunting ends on a curve or between two stages, along the first key or else the second.
+
+    Otherwise the corners are told.
+    """
     keys = (MM, ShownKey("controller.kp", "N/m"))
     (curve,) = crossing.curves
     slant = np.array([0.2, 0.0])

@@ -72,7 +72,7 @@ def test_cycles_against_simulation_and_scipy(law: str) -> None:
 
 
 def drift(friction: str, periods: int) -> float:
-    """By how much [m] a body moves between the tenth and the last period of a load of 0.4 N +/- 0.25 N at 20 Hz."""
+    """Return how far [m] a body drifts from the tenth to the last period of a load of 0.4 N +/- 0.25 N at 20 Hz."""
     held = stage(HOLD, friction=friction, controller=gains(1e-6))
     shape, frequency, per = kernel(Driven(structure(held.flat()))), 20.0, 40
     t = np.arange(periods * per + 1) / per / frequency
@@ -131,7 +131,7 @@ def test_passive_laws_create_no_energy(law: str, speed: float, bent: float, expo
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("asymmetry", [0.5, -0.5])
 def test_a_law_is_passive_only_if_it_is_in_both_directions(law: str, asymmetry: float) -> None:
-    """With half the viscous damping one way it takes twice as much."""
+    """If viscous damping is half as large in one direction, twice as much is needed."""
     flat = {**HUNTING[law].flat(), "friction.coulomb": 1.5, "friction.viscous_asymmetry": asymmetry}
     flat["friction.rolling_exponent"], least = 1.0, 2 * 316.2277660168379 * (3 / 1.5 - 1)
     assert friction_law(law).active({**flat, "friction.viscous": 0.999 * least})
@@ -174,8 +174,10 @@ def test_imposed_motion_takes_every_law() -> None:
 
 
 def test_what_of_them_is_fitted() -> None:
-    """Of rolling friction what LuGre has, its exponent as given; elasto-plastic friction is refused, not ignored: its
-    stiffness is bounded by its break-away deflection."""
+    """Rolling friction is fitted in the keys of LuGre, with its exponent as given.
+
+    Elasto-plastic friction is refused, not ignored: its stiffness is bounded by its break-away deflection.
+    """
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
     names = {item.name for item in fit_parameters(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
     assert {"friction.bristle_stiffness", "friction.bristle_damping", "friction.stribeck_velocity"} <= names

@@ -89,7 +89,7 @@ def start(folder: Path, name: str = "stand-in", **more: str) -> subprocess.Popen
 
 
 def finished(process: subprocess.Popen[str]) -> tuple[bool, str]:
-    """Whether the process had the entry built (what runs is loaded from it in any case), and what it logged."""
+    """Return whether the process built the entry (code always runs from the cache), and what it logged."""
     out, err = process.communicate(timeout=120)
     assert process.returncode == 0, err
     assert out == ""
@@ -195,7 +195,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
 
 
 def test_what_is_used_is_kept(copied: Path) -> None:
-    """Also where it was built long ago: its use is noted."""
+    """An entry that was built long ago stays too, because its use is recorded."""
     (old,) = entries(copied)
     aged(KEPT_FOR + DAY, old, *(copied / "kernels").glob("*.request"))
     assert not built(copied)
@@ -204,7 +204,7 @@ def test_what_is_used_is_kept(copied: Path) -> None:
 
 
 def test_there_is_an_end_to_what_is_kept(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was used longest ago goes first; what was used today stays."""
+    """Entries unused for longest go first; entries used today stay."""
     first, folder = entry(copied), copied / "kernels"
     others = [Path(shutil.copy(first, first.with_name(f"{i}" * 24 + ".kernel"))) for i in range(1, 4)]
     size = first.stat().st_size
@@ -247,7 +247,7 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that has ended while it waited costs a new one, and nothing else."""
+    """A builder that has ended while waiting is replaced by a new one."""
     (tmp_path / "telling_builder.py").write_text(
         "import os\ndef build(folder, task):\n    return f'{os.getpid():024x}'\n"
     )
@@ -370,7 +370,7 @@ def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPa
 def test_the_folder_is_one_as_users_write_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """With ~ for the user's own; why a file is none is told in words."""
+    """A ~ stands for the user's own folder; the reason why a file is no folder is told in words."""
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
     monkeypatch.setenv(cache.FOLDER_VARIABLE, os.path.join("~", "kept"))
@@ -417,7 +417,7 @@ def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
 @posix
 @pytest.mark.parametrize("permissions", [0o770, 0o707, 0o777])
 def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path, permissions: int) -> None:
-    """It is not friso's to close: the kernel is compiled elsewhere, and nothing of the folder is loaded."""
+    """friso may not close it: the kernel is compiled elsewhere, and nothing is loaded from the folder."""
     copied.chmod(permissions)
     made, log = finished(start(copied))
     assert made
@@ -469,7 +469,7 @@ def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Pa
 
 
 def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
-    """Whole, of the right name and permissions: sealed with another secret, or with that of another entry."""
+    """A planted entry is complete, with the right name and mode, but sealed with another secret or as another entry."""
     kernel, other = entry(copied), tmp_path / "elsewhere"
     other.mkdir(mode=0o700)
     write_sealed(other / kernel.name, kernel.read_bytes()[LENGTH:])

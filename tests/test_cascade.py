@@ -95,7 +95,7 @@ def test_trace_against_radau() -> None:
 def solve_in_pieces(
     machine: Stage, names: tuple[str, ...], times: np.ndarray, corners: tuple[float, ...]
 ) -> np.ndarray:
-    """The same, begun anew at every corner of the reference."""
+    """Solve the equations as `solve` does, but start anew at every corner of the reference."""
     right_hand_side, x, positions = plain.rates(machine.flat(), names), np.zeros(len(names)), []
     ends = (0.0, *corners, times[-1])
     for start, end in pairwise(ends):
@@ -247,7 +247,7 @@ def sampled_forces(flat: dict[str, Any], error: np.ndarray, reading: np.ndarray,
 
 
 def test_settings_against_friction_that_never_act_change_nothing() -> None:
-    """All of them at once, whose conditions depend on each other, in both integrals of a cascade."""
+    """All settings are given at once, with conditions that depend on each other, in both integrals."""
     idle = """
         integral_limit = "1 MN"
         integral_deadband = "1e-9 nm"
@@ -342,7 +342,7 @@ def test_what_is_wrong_is_told(changes: dict[str, Any], parts: list[str]) -> Non
 
 @pytest.mark.thorough
 def test_boundary_and_map_agree_on_where_hunting_ends() -> None:
-    """In the integral time of the velocity loop."""
+    """The key is the integral time of the velocity loop."""
     machine = rigid(PI)
     traced = friso.boundary(machine, {INTEGRAL_TIME: "20 ms..200 ms"})
     ends = np.array([traced.value(point.point.place) for points in traced.special for point in points])
@@ -414,7 +414,7 @@ def test_identify_in_its_own_loop(whole: Stage) -> None:
 
 
 def test_emps_is_a_cascade(tmp_path: Path) -> None:
-    """The same forces predicted from its record by the cascade as by the PD of the same gains, sampled and all."""
+    """From its record the cascade predicts the same forces as the PD of equal gains, also sampled."""
     axis = friso.load(DRIVE.with_name("emps_axis.toml")).replace(
         {"drive.sample_time": "1 ms", "drive.velocity_samples": 2.0}
     )

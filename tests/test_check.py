@@ -168,7 +168,7 @@ def test_the_edge_of_hunting_of_the_thesis_rig(checked: CheckAnswer) -> None:
     ],
 )
 def test_verdicts_by_the_cycle(rig: Stage, crossover: str, joint: str, verdict: str, attracts: bool) -> None:
-    """Just above the edge a move still swings for minutes; below that of the free rig it takes a kick to hunt."""
+    """Just above the edge a move still swings for minutes; below the free rig's edge only a kick starts hunting."""
     stage = rig.replace({"controller.crossover": crossover, "joint.locked": joint == "locked"})
     judgement = check_given(stage, 1e-6).judgement
     assert judgement.verdict == verdict

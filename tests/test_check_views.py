@@ -1,4 +1,4 @@
-"""What a check looks like: its figures, its sentences and table, and its page, on cases made up here."""
+"""Test what a check shows: its figures, sentences, table and page, on made-up cases."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def test_response_of_one_run():
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    """With its prints."""
+    """Return a page with its print images."""
     with patched({pages: {"image": images.image}}):
         return check_html(both_joints())
 
@@ -292,7 +292,7 @@ def after(fine: float | None, coarse: float | None) -> dict[str, Any]:
 
 
 def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
-    """A stage whose force is limited without anti-windup; what attracts it, if anything does, was observed alone."""
+    """Return a judgement for a force limit without anti-windup, with an attractor that was only observed."""
     if verdict == "settles":
         return settles(hunting=replace(fake_hunting(), lower_gains=lower_gains))
     swings = (Swing(8.9, 52.0, regular=True, swings=2),)
@@ -301,7 +301,7 @@ def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
 
 
 def said_by_name() -> dict[str, str]:
-    """What is said of stages that differ in one respect."""
+    """Return what is said about stages that differ in one respect, by name."""
     free = {"free": replace(fake_case(), judgement=settles())}
     none, away = Kick((), (1e-5, 0.1)), Kick(((6.22e-4, 0.03),), (3e-6, 0.03))
     repels = fake_hunting(fake_cycle(multiplier=-1.0112))
@@ -378,7 +378,7 @@ def test_numbers_in_sentences(name: str, facts: list[str]) -> None:
 
 
 def test_no_higher_bandwidth_is_advised_for_a_swing_that_grows_beyond_the_force_limit() -> None:
-    """There the loop is unstable (Hurwitz, docs/hunting.md): a faster one all the more."""
+    """Such a loop is unstable (Hurwitz, docs/hunting.md), and a faster one even more so."""
     texts = said_by_name()
     assert not any("Hz" in texts[name] for name in ("hunts, grows", "bistable, grows"))
 
@@ -513,7 +513,8 @@ def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(word
 
 
 def test_windows_are_told_beside_the_edge() -> None:
-    """From 8 Hz: again above 40.0 Hz (± 1 %), and not below 4.04 Hz, where 4 Hz settles; both rounded downward."""
+    """From 8 Hz, the stage hunts again above 40.0 Hz (± 1 %), and not below 4.04 Hz: 4 Hz settles. Both are rounded
+    down."""
     window, lower = AttractionEnd(5.0049, 4.96, True), AttractionEnd(0.505, 0.5004, True)
     assert "40.0 Hz" in sentence(hunts(windows=(BandwidthWindow(window, None),)))
     assert "to 4.00 Hz" in sentence(hunts(lower=lower))
@@ -531,7 +532,7 @@ def test_windows_are_told_beside_the_edge() -> None:
 
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
-    """What is told holds the whole of what is known, rounding and all."""
+    """The stated range contains the known range, including rounding."""
     case = replace(fake_case(), judgement=settles())
     assert case.judgement.margin
     edge = factor * case.judgement.margin.crossover / case.judgement.margin.factor
@@ -543,7 +544,7 @@ def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
 
 
 def test_an_edge_is_told_with_what_is_known_of_it() -> None:
-    """In the sentence and in the table."""
+    """The error is in the sentence and in the table."""
     rough = Margin(0.6998, 5.598, True, 0.6998 * 1.0028)
     edge = "5.598 Hz (± 0.3 %)"
     assert edge in sentence(settles(margin=rough))

@@ -1,4 +1,4 @@
-"""The command line: what it prints, its exit status, what it writes."""
+"""Test the command line: what it prints, its exit status, what it writes."""
 
 import copy
 import json
@@ -33,7 +33,7 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
 
 @pytest.fixture(scope="module")
 def checked() -> dict[str, Any]:
-    """What `friso check --json` prints of the rig."""
+    """Return what `friso check --json` prints about the rig."""
     return json.loads(run("check", RIG, "--json").stdout)
 
 
@@ -88,7 +88,7 @@ def test_the_time_to_go_leaves_out_compiling(clock: list[float]) -> None:
 def test_a_wait_is_told_where_no_terminal_shows_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Also while nothing is reported."""
+    """The line appears even while nothing is reported."""
     monkeypatch.setattr("friso.cli.progress.LINES", 0.01)
     with ProgressBar("first") as bar:
         _until_told(capsys, "friso: first")
@@ -160,7 +160,7 @@ def test_set_overrides_any_key() -> None:
 def test_a_shell_completes_commands_and_options(
     typed: str, fits: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As bash asks: friso is called without arguments, what was typed stands in the environment."""
+    """bash calls friso without arguments, and puts what was typed into the environment."""
     asked = {"_FRISO_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
     for name, value in asked.items():
         monkeypatch.setenv(name, value)
@@ -193,7 +193,7 @@ def test_init_writes_a_stage_that_checks_and_overwrites_nothing(tmp_path: Path) 
 
 
 def test_version() -> None:
-    """In a process of its own, as a user runs it."""
+    """The command runs in a process of its own, as for a user."""
     done = subprocess.run([sys.executable, "-m", "friso", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"friso {friso.__version__}\n"
 

@@ -47,7 +47,8 @@ def keys(stage: Stage, delay: float = 0.0, **changes: Any) -> Flat:
 FLAT_TABLES = Tables(np.ones((1, 3, 2)), np.array([[0.0, 1.0]]), np.zeros((1, 2, 2)), np.ones(1))
 
 SPACING, GRID, POINTS = 2e-3, 0.5e-3, 9
-"""Of the tables over time [s] and over position [m], from -1 mm; the position goes beyond both of their ends."""
+"""Spacing of the tables over time [s] and over position [m], from -1 mm, and their points; the position exceeds both
+ends."""
 
 
 def surroundings() -> Tables:
@@ -61,7 +62,7 @@ def surroundings() -> Tables:
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    """All that is needed is compiled side by side."""
+    """Compile all kernels of these tests side by side."""
     kernels([KernelRequest(AsBuilt.of(keys(axis(), delay))) for delay in (0.0, 2.0)])
 
 
@@ -129,7 +130,7 @@ def field() -> np.ndarray:
 @pytest.mark.parametrize("lag", [1, 2, 3, 64])
 @pytest.mark.parametrize("along", [0, 1], ids=["seeds", "ticks"])
 def test_neighbours_are_independent(lag: int, along: int) -> None:
-    """Of neighbouring seeds, and of neighbouring ticks, neither the deviates nor their squares tell of each other."""
+    """For neighbouring seeds, and neighbouring ticks, deviates and their squares are uncorrelated."""
     z = np.moveaxis(field(), along, 0)
     for values in (z, (z**2 - 1) / np.sqrt(2)):
         assert np.mean(values[lag:] * values[:-lag]) == pytest.approx(0, abs=5 / float(np.sqrt(values[lag:].size)))
@@ -235,7 +236,7 @@ def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
 @pytest.mark.parametrize("every", [2, 5, 40])
 @pytest.mark.parametrize("delay", [0.0, 2.6])
 def test_samples_are_noted_at_their_instants(every: int, delay: float) -> None:
-    """Every so many samples of the drive: the same numbers as when all are noted."""
+    """With every so many samples of the drive, numbers equal those with all samples."""
     flat = keys(axis(), delay, encoder_noise=NOISE)
     every_one, part = (run(flat, every=n)[1].samples[0] for n in (1, every))
     assert np.array_equal(part[:-1], every_one[:-1:every])
@@ -325,7 +326,7 @@ def stepping(command: sp.Expr, held: tuple[Held, ...]) -> tuple[list[str], Calla
 
 
 def iterated(command: sp.Expr, held: tuple[Held, ...], flat: Flat, inputs: Mapping[str, np.ndarray]) -> Flat:
-    """What is commanded and held at every sample, all beginning at 0."""
+    """Return the commanded and held numbers at every sample, all starting at 0."""
     names, step = stepping(command, held)
     labels = [str(state.symbol) for state in held]
     rows, last = [], [0.0] * len(labels)
@@ -372,7 +373,7 @@ def test_eq_7_is_its_bilinear_transform() -> None:
 
 @pytest.mark.parametrize("derivative_on", ["error", "measurement"])
 def test_eq_6_with_a_filter_is_its_bilinear_transform(derivative_on: Literal["error", "measurement"]) -> None:
-    """But for its integral, which is a sum."""
+    """The integral is the exception: it is a sum."""
     error, position = np.random.default_rng(5).normal(0, 1e-3, (2, 300))
     command, held = sampled_controller(
         ControllerForm("pid", "PidGains", Terms(True, True, derivative_on), integral=True), SEEN, 1
@@ -433,7 +434,7 @@ def motions() -> dict[str, np.ndarray]:
 
 @cache
 def commanded(form: AsBuilt) -> tuple[sp.Expr, tuple[Held, ...]]:
-    """What the drive commands and holds, of a reference and its speed."""
+    """Return the command and held numbers of a drive, as functions of a reference and its speed."""
     position = state("position")
     error, acceleration = sp.Symbol("reference", real=True) - position, sp.Symbol("reference.acceleration", real=True)
     seen = Loop(error, position, state("velocity"), SEEN.reference_velocity, acceleration)
@@ -457,7 +458,7 @@ DRIVES = {
 @pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
 @pytest.mark.parametrize("feature", DRIVES)
 def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
-    """One by one and together; each makes a difference, and the limit is met."""
+    """Features are tested one by one and together; each makes a difference, and the limit is reached."""
     flat, inputs = keys(axis(), **DRIVES[feature]) | tuned, motions()
     result = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
     commands, integrals = plain_drive(flat, inputs)
@@ -471,7 +472,7 @@ def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
 @pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
 @pytest.mark.parametrize("anti_windup", ["none", "back_calculation"])
 def test_the_integrator_at_the_limit_of_the_force(anti_windup: str, tuned: Flat) -> None:
-    """It winds up, or unwinds by what is cut off; either differs from the integrator that rests."""
+    """The integrator winds up, or unwinds in proportion to the excess; both differ from one that rests."""
     how = {"controller.anti_windup": anti_windup, "controller.anti_windup_time": 5 * TIME}
     flat, inputs = keys(axis()) | tuned | how, motions()
     held = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
@@ -491,7 +492,7 @@ def settled(error: list[float], **drive: float) -> np.ndarray:
 
 
 def test_the_integrator_rests_and_restarts() -> None:
-    """Below its deadband it keeps what it has; where the error changes sign, at once or over zeros, it begins anew."""
+    """Below its deadband it keeps its value; where the error changes sign, at once or via zeros, it restarts."""
     micro = 1e-6
     rests = settled([5 * micro, 2 * micro, -2 * micro, 4 * micro, -3 * micro], integrator_deadband=3 * micro)
     assert rests / micro == pytest.approx([5, 5, 5, 9, 6])

@@ -92,8 +92,10 @@ def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
 
 
 def test_presliding_of_every_law_is_drawn() -> None:
-    """Elements by one factor; the deflection at which bristles begin to slip below that of sliding, without a draw that
-    it rules out: Coulomb friction is drawn as with LuGre."""
+    """Elements share one factor; the deflection at which bristles slip stays below that of sliding.
+
+    It excludes no draw: Coulomb friction is drawn as with LuGre.
+    """
     elements = load(EXAMPLE.with_name("thesis_rig_gms.toml"))
     gms = draw_machines(elements, Correlations(), 200, 3)
     for array in ELEMENTS:
@@ -257,7 +259,7 @@ frequencies, sizes = st.floats(0.25, 5.0), st.floats(1e-5, 1e-2)
 
 
 def words(deviation: np.ndarray, within: float) -> list[str]:
-    """What runs do at their end."""
+    """Return the outcomes of runs."""
     return outcomes(end_of_traces(TIME, deviation, within), within).tolist()
 
 
@@ -290,7 +292,7 @@ def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> 
 
 
 def test_there_and_back_the_longer_time_of_both_ends_counts() -> None:
-    """And none where a stage is outside the band when it returns, as one that never leaves."""
+    """The time is infinite if the stage is outside the band when the reference returns, even if it never left."""
     there, back = Stand(1.0, 6.0), Stand(8.0, TIME[-1])
     late = np.where((TIME < 4.0) | ((TIME > 6.5) & (TIME < 8.5)), 1.0, 0.0)[None]
     never_there = np.where(TIME < 8.0, 1.0, 0.0)[None]
@@ -472,7 +474,10 @@ def test_sooner_later_and_alike(made_up: Comparison) -> None:
 
 
 def test_a_far_end_that_half_of_the_machines_miss_is_told(made_up: Comparison) -> None:
-    """They rest in the end, but not while the reference stands at the far end: neither settles in time."""
+    """The machines rest at the end, but not while the reference stands at the far end.
+
+    Such machines do not settle in time.
+    """
     late = replace(made_up.results[0], measures=replace(made_up.results[0].measures, settling=np.full(COUNT, np.inf)))
     on_time, too_late = (
         " ".join(sentences(replace(made_up, results=results))) for results in (made_up.results, (late,))
@@ -503,7 +508,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison, wording: Wo
 
 
 def test_machines_that_rest_where_they_begin_are_drawn(made_up: Comparison) -> None:
-    """Their RMS error in position is 0, which a logarithmic axis has no place for: matplotlib warned."""
+    """The RMS error of such a machine is 0, which a logarithmic axis cannot show: matplotlib warned."""
     still = [
         replace(result, measures=replace(result.measures, in_position=np.zeros(COUNT))) for result in made_up.results
     ]
@@ -607,7 +612,7 @@ def test_settings_that_are_asked_for_are_tried() -> None:
 
 
 def test_a_limit_of_the_bandwidth_holds_for_faster_controllers(machines: Machines) -> None:
-    """As where the loop crosses 0 dB, with and without the joint; below the present one there is no faster one."""
+    """The limit holds for the 0 dB crossing, with and without joint; below the present crossover none is faster."""
     tried = {option.kind.name: option for option in options(machines, 1e-6, bandwidth_limit=30.0).options}
     free = {option.kind.name: option for option in options(machines, 1e-6).options}
     for name in ("faster", "isolator-faster"):
@@ -618,7 +623,7 @@ def test_a_limit_of_the_bandwidth_holds_for_faster_controllers(machines: Machine
 
 
 def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
-    """Where more machines rest at each higher bandwidth, it is the first at which enough do, and from which on."""
+    """If more machines rest at each higher bandwidth, it is the first from which enough do."""
     needed = NeededBandwidth(np.array([10.0, 12.0, 14.0, 16.0]), np.array([0.5, 1.0, 0.9, 1.0]))
     assert (needed.turning(0.99), needed.turning(0.4), needed.turning(1.1)) == (3, 0, None)
     never = replace(comparison.results[0].measures, settling=np.full(COUNT, np.inf))
@@ -635,7 +640,7 @@ def test_the_conclusion_turns_at_a_bandwidth(comparison: Comparison) -> None:
 
 
 def test_ctrl_c_keeps_the_options_that_were_run(built: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a conclusion of these alone, which says so; before the first there is nothing to keep."""
+    """The conclusion covers these options alone, and says so; before the first there is nothing to keep."""
     ran = []
 
     def runs(work: study._Work, option: Option, before: int) -> measures.MachineMeasures:

@@ -58,7 +58,7 @@ def one(end: End, k: int) -> End:
 
 @given(st.tuples(*[st.booleans()] * 4))
 def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool]) -> None:
-    """By the table of `friso.hunting.criteria.stage_verdict`, entry by entry."""
+    """The table of `friso.hunting.criteria.stage_verdict` is tested entry by entry."""
     sure, attracts, in_cycle, rests = facts
     (word,) = verdicts(*(np.array([flag]) for flag in facts))
     assert word in VERDICTS
@@ -106,7 +106,7 @@ ends = st.tuples(
 
 @given(st.lists(ends, min_size=1, max_size=20), st.floats(1e-7, 1e-3), st.floats(0.0, 5.0))
 def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: float) -> None:
-    """By the definitions of `friso.hunting.criteria.run_outcome`; and a batch is all of its runs."""
+    """The definitions of `friso.hunting.criteria.run_outcome` are tested; a batch equals its single runs."""
     done, swing, before, period, turned, outside = (np.array(column) for column in zip(*several, strict=True))
     earlier = np.maximum(swing, before)
     end = End(done, swing, earlier, period, turned, outside, np.full(len(several), DURATION))
@@ -124,7 +124,7 @@ def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: flo
 @settings(max_examples=60)
 @given(st.floats(0.3, 5.0), st.floats(1e-5, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0.5, 50.0), st.floats(1e-7, 1e-2))
 def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay: float, band: float) -> None:
-    """What swings, drifts, stands or dies out, and the mirror image of each."""
+    """Traces swing, drift, stand or die out; each is tested with its mirror image."""
     swing = offset + size * np.sin(2 * np.pi * frequency * TIME)
     dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
     runs = np.array([swing, dying, offset + 0 * TIME, offset + size * TIME])
@@ -212,7 +212,7 @@ waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats
 @settings(max_examples=150)
 @given(waves, st.floats(-1e-3, 1e-3))
 def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float, float]], offset: float) -> None:
-    """The thesis's rule is that of findpeaks: it asks for no prominence."""
+    """The thesis's rule is that of findpeaks, which asks for no prominence."""
     values = offset + sum(size * np.sin(2 * np.pi * rate * TIME + phase) for rate, size, phase in parts)
     times, turns = turning_points(TIME, values)
     assume(len(times) > 1 and len({*turns}) == len(turns))  # of equals either may stay

@@ -48,7 +48,7 @@ LAWS = {
     "rolling": rolling(),
 }
 STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
-"""Those of which all or a part follows small motions as a spring."""
+"""Laws of which all or a part follows small motions as a spring."""
 
 STEADY = settings(max_examples=25)
 DESCRIBING = pytest.mark.xdist_group("describing")
@@ -183,14 +183,14 @@ def settled(flat: dict[str, Any], amplitude: float, frequency: float, periods: i
     ("amplitude", "frequency", "periods"), [(3e-5, 0.1, 7), (1e-4, 100.0, 2), (1e-3, 5.0, 2), (2e-2, 2.0, 2)]
 )
 def test_plain_integration(amplitude: float, frequency: float, periods: int) -> None:
-    """The same law written by hand."""
+    """The reference is the law written by hand."""
     flat = rigid(LAWS["lugre"]).flat()
     (value,) = of(flat, amplitude, frequency)
     assert abs(value / settled(flat, amplitude, frequency, periods) - 1) < 1e-8
 
 
 def test_long_memory_is_solved_for() -> None:
-    """At 10 nm a state takes thousands of periods to forget its start: settling for three misses what solving finds."""
+    """At 10 nm a state takes thousands of periods to forget its start: settling for three periods is not enough."""
     flat = rigid(LAWS["lugre"]).flat()
     friction = Imposition.of(flat, np.array([1e-8]), np.array([10.0]), 1e-10)
     steady_state = steady(friction)
@@ -282,7 +282,7 @@ def test_units(amplitude: float, frequency: float, length: float, force: float, 
 
 
 def test_sinusoids_lose_energy_although_the_thesis_values_are_not_passive() -> None:
-    """At all amplitudes and frequencies looked at; as a spring, friction is negative at some of them."""
+    """Sinusoids lose energy at all examined amplitudes and frequencies; friction is a negative spring at some."""
     responses = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
     assert set(np.ravel(responses["status"])) == {"done"}
     assert float(responses["work"].min()) > 0
@@ -344,7 +344,7 @@ def test_large_forces_see_the_mass() -> None:
 
 
 def driven(force: Callable[[float], float], frequency: float, start: list[float], cycles: int) -> complex:
-    """First harmonic of the position of 1.7 kg under a sinusoidal force, in the last of so many cycles (LSODA)."""
+    """Return the first harmonic of the position of 1.7 kg under a sinusoidal force, in the last cycle (LSODA)."""
     flat, omega, samples = rigid(LAWS["lugre"]).flat(), 2 * np.pi * frequency, 512
 
     def rates(t: float, y: np.ndarray) -> list[float]:
@@ -412,7 +412,7 @@ def test_absurd_forces_and_frequencies_have_a_status() -> None:
 
 
 def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where friction is not known for small motions, neither is the stuck answer, and no analyser shows another."""
+    """If friction is unknown for small motions, so is the stuck response, and no analyser shows another."""
 
     def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
         return np.where(amplitudes < 1e-4, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
@@ -437,7 +437,7 @@ JOINED = stage(HOLD, masses="both", friction=lugre(2), joint=free("100 mm"), con
 
 
 def against_simulation(size: float, frequency: float, cycles: int = 25) -> complex:
-    """Response of stage and cart on a free joint over that of the equations (LSODA) in the last of so many cycles."""
+    """Return the response of stage and cart on a free joint over that of the equations (LSODA), in the last cycle."""
     result, flat, samples = plant_response(JOINED, [size], [frequency]), JOINED.flat(), 512
     omega, cart, moved = (
         2 * np.pi * frequency,

@@ -1,4 +1,4 @@
-"""`friso design` as a user runs it: what it writes, says, draws and refuses."""
+"""Test `friso design` as a user runs it: what it writes, says, draws and refuses."""
 
 import json
 import re
@@ -96,7 +96,7 @@ def designed(rig: Stage, spec: Path, small: None) -> Design:
 
 @pytest.fixture(scope="module")
 def finished(designed: Design) -> Iterator[list[str]]:
-    """The command finds this design; what it tells of its progress is kept."""
+    """Let the command find this design; record what it reports of its progress."""
     labels: list[str] = []
 
     def design(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
@@ -133,7 +133,7 @@ def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def no_design(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No design, and what to relax."""
+    """Let the command find no design, and what to relax."""
 
     def fail(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
         raise NoDesign("no leaf springs meet the specification", RELAXED)
@@ -325,7 +325,7 @@ def test_damping_that_is_worth_adding_or_not(designed: Design, snapshots: Snapsh
 
 
 def restless(count: int) -> np.ndarray:
-    """Words of 64 moves of which so many do not come to rest: the first creeps, the others swing."""
+    """Return the outcomes of 64 moves of which `count` do not rest: the first creeps, the others swing."""
     words = np.where(np.arange(64) < count, "swings", "rests").astype(object)
     words[0] = "creeps"
     return words
@@ -568,7 +568,7 @@ def test_a_specification_that_is_not_met_is_told(
     capsys: pytest.CaptureFixture,
     wording: Wording,
 ) -> None:
-    """What there is is written all the same; the status is 2, and the message says what would be met."""
+    """What exists is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
     less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
     monkeypatch.setattr(method, "design", lambda stage, spec, progress, laws, anyway: less)
@@ -588,7 +588,7 @@ def test_a_specification_that_is_not_met_is_told(
 def test_ctrl_c_keeps_the_leaves_and_the_crossover(
     rig: Stage, spec: Path, small: None, tmp_path: Path, during: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With what is known of hunting by then; before there are leaves it ends without an answer."""
+    """The answer contains what is known of hunting by then; without leaves there is no answer."""
 
     def interrupted(*_: Any, **__: Any) -> Any:
         raise KeyboardInterrupt

@@ -73,7 +73,7 @@ def tables(*names: str) -> dict[str, object]:
 
 
 def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> None:
-    """No candidate is beaten in both, all meet the requirements, and no random geometry beats one by a tenth."""
+    """No candidate is beaten in both objectives, all meet the requirements, no random geometry is 10 % better."""
     stiffness, frequency = (
         np.array([getattr(candidate, name) for candidate in candidates]) for name in ("stiffness", "frequency")
     )
@@ -95,7 +95,7 @@ def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> No
 
 
 def test_better_than_the_thesis_in_both(task: LeafTask, candidates: list[Candidate]) -> None:
-    """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and in parasitic frequency."""
+    """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
     own = closed_form_model(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).member(0), 1e-3)
     choice = chosen(replace(task, crossover=40.0), candidates)
@@ -136,7 +136,7 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
 
 
 def replace_leaves(mechanism: Mechanism) -> Mechanism:
-    """One leaf in the middle instead of two, whose moment at its root is asked for."""
+    """Return a mechanism with one leaf in the middle instead of two, for the moment at its root."""
     return replace(mechanism, leaves=1.0)
 
 
@@ -166,7 +166,7 @@ def test_a_geometry_at_which_beams_fail_is_marked(
 
 @pytest.mark.thorough
 def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is said to be enough is enough, and a tenth less is not."""
+    """The stated relaxation is enough, and a tenth less is not."""
     with DesignSettings(front_generations=60, relaxed_generations=60).in_use():
         task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
         assert not front(task)
@@ -189,7 +189,7 @@ def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> No
 def test_where_there_is_no_design_it_is_said_whether_an_isolator_is_needed(
     base: Stage, monkeypatch: pytest.MonkeyPatch, edge: float, begins: str
 ) -> None:
-    """Of a machine that cannot have leaf springs, by its edge of hunting [Hz] without isolator."""
+    """The edge of hunting [Hz] without isolator decides, also for a machine that cannot have leaf springs."""
 
     def edges(_: object, population: Population, low: float, high: float, *others: object) -> Corners:
         return Corners(population, np.full(population.count, edge), (low, high))
@@ -259,8 +259,10 @@ def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
 
 
 def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
-    """With the one mode that the equations have, the margin is theirs; where actuator and sensor move against each
-    other the loop is found unstable, as the poles of the state space are."""
+    """With the single mode of the equations, the margin equals theirs.
+
+    If actuator and sensor move against each other, the loop is unstable, as the poles of the state space show.
+    """
     leaves_ = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
     stage = with_leaves(base, leaves_, 1e-3).replace({"controller.crossover": "40 Hz"})
     result = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
@@ -337,8 +339,10 @@ def test_without_a_comfortable_crossover_there_is_no_design(
 
 
 def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
-    """At 8 Hz the locked rig hunts and the free one settles, in the time that a run at the same tolerance takes: the
-    limiter scatters it by some per cent from one tolerance to the next."""
+    """At 8 Hz the locked rig hunts and the free one settles, in the time of a run at equal tolerance.
+
+    The limiter scatters that time by some per cent from one tolerance to the next.
+    """
     rig = friso.load(EXAMPLES / "thesis_rig.toml")
     flat = rig.flat()
     for held, hunts in ((True, True), (False, False)):

@@ -1,4 +1,4 @@
-"""Specifications: what is read, what is refused, and the machines that they allow."""
+"""Test specifications: what is read, what is refused, and the machines that they allow."""
 
 import copy
 import tomllib
@@ -174,7 +174,7 @@ def test_the_outline_of_a_specification_is_one(rig: friso.Stage) -> None:
 
 
 def test_other_controllers_give_way_to_the_rules_at_their_bandwidth(rig: friso.Stage) -> None:
-    """Of a rigid stage too, whose specification is made from it."""
+    """The rules also replace the controller of a rigid stage from which the specification is made."""
     cascade = {"kind": "cascade", "kv": "10 1/s", "kp": "85 N*s/m", "velocity_integral_time": "0.1 s"}
     limited = {**cascade, "force_limit": "200 N"}
     stage = rig.replace({"controller": limited, "joint": None, "parasitic": None})

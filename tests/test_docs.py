@@ -1,4 +1,4 @@
-"""README, docs and package: what they link to is there, what is generated is complete, what is made is not stale."""
+"""Test README, docs and package: links lead somewhere, generated pages are complete and not stale."""
 
 import importlib.util
 import json
@@ -61,7 +61,7 @@ def test_the_readme_is_short_and_has_the_two_lines() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_examples_that_are_named_are_there(page: Path) -> None:
-    """And so in the wheel, which holds all of them."""
+    """The wheel contains all of them."""
     names = re.findall(r"\bexamples/[\w./]*\w", page.read_text(encoding="utf-8"))
     assert [name for name in names if not (ROOT / name).exists()] == []
 
@@ -82,7 +82,7 @@ def test_figures_are_of_what_makes_them_and_small() -> None:
 
 
 def keys_of(node: Mapping[str, Any]) -> Iterator[str]:
-    """All keys of a schema."""
+    """Yield all keys of a schema."""
     for key, value in node.get("properties", {}).items():
         yield key
         yield from keys_of(value)
@@ -146,7 +146,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> None:
-    """With all that is no Python: templates, materials, examples."""
+    """The wheel contains all files that are not Python: templates, materials, examples."""
     (wheel,) = built.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "installed")

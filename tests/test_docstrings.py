@@ -121,7 +121,7 @@ def test_what_counts_as_a_unit() -> None:
 
 @pytest.mark.parametrize("name", [*friso.__all__, "reproduce", "guideline"])
 def test_the_public_list(name: str) -> None:
-    """Everything has a docstring; that of a function has every argument, the errors raised, and an example."""
+    """Everything has a docstring; a function's has every argument, the errors raised, and an example."""
     value = getattr(friso, name)
     if name == "__version__":
         return

@@ -225,7 +225,7 @@ def test_figures_drawn_in_threads_are_those_drawn_alone():
 
 
 def test_figures_are_drawn_beside_as_they_are_here(monkeypatch):
-    """In processes of their own; one that has waited for too long, and ended, is replaced."""
+    """Separate processes draw the figures; a process that ended after waiting too long is replaced."""
     monkeypatch.setattr(images, "usable_cores", lambda: 2)
     figures = [small_figure(), small_figure()]
     with speaking_of(ROTARY), images.drawing_beside() as artists:
@@ -245,7 +245,7 @@ def test_a_figure_that_no_process_draws_is_drawn_here(monkeypatch):
 
 
 def test_what_is_drawn_at_the_end_is_given_up(monkeypatch):
-    """Not handed to a new process, for which an interrupted command waited seconds."""
+    """A figure is not handed to a new process, for which an interrupted command used to wait seconds."""
     asked, killed = Event(), Event()
 
     class Drawing:
@@ -325,7 +325,10 @@ def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
 
 
 def test_fonts_of_a_pdf_hold_letters_alone():
-    """Their places are in the file, so no table says them; nothing is left behind for others who cut fonts down."""
+    """The letters' places are in the file, so the PDF needs no table of them.
+
+    The library that cuts fonts down is left as it was for others.
+    """
     usual = subset.Options().drop_tables
     pdf = matplotlib_renderer.image(small_figure(), "pdf")
     packed = re.findall(rb"stream\r?\n(x.*?)endstream", pdf, re.DOTALL)
@@ -337,7 +340,7 @@ def test_fonts_of_a_pdf_hold_letters_alone():
 
 
 def test_apostrophes_of_a_picture_do_not_end_its_attributes() -> None:
-    """In the address of a picture its quotation marks are apostrophes."""
+    """Within the address of a picture, quotation marks are apostrophes."""
     picture = """<svg a="it's" b="2 % &amp; #">d'or</svg>"""
     address = re.search(r'src="([^"]*)"', f'<img src="{pages._plain(picture)}">')
     assert address is not None
@@ -349,7 +352,10 @@ LINE = "M 1.04 -2 L 1.04 0.5 L 1.06 0.5 L 1.07 0.52 L -3.26 0.5 z M 10 20.25 L 0
 
 
 def test_lines_in_less_text_end_where_they_did() -> None:
-    """Each place to a tenth; rounding does not add up, what does not move is left out, a second line begins anew."""
+    """Each coordinate is exact to a tenth: rounding does not add up, and a second line begins anew.
+
+    Coordinates that do not change are left out.
+    """
     shorter = re.sub(r'(?<= d=")[^"]*', pages._shortened, f'<path d="{LINE}"/>')
     assert shorter == '<path d="M1-2l0 2.5 .1 0-4.4 0zM10 20.2l-10-20.2"/>'
     curved = re.sub(r'(?<= d=")[^"]*', pages._shortened, '<path d="M 0 1.25 Q 0.25 3 -4 5 z"/>')
@@ -431,7 +437,7 @@ def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: in
 
 
 def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
-    """On a narrow page four entries take two rows; where there is neither title nor key, nothing is kept free above."""
+    """On a narrow page four entries take two rows; without title and key, no space is kept above."""
     categories = tuple(Category(f"a category {k}", GREY) for k in range(4))
     codes = np.array([np.arange(4.0)] * 2)
     nothing = np.full(codes.shape, np.nan)
@@ -446,7 +452,7 @@ def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
 
 
 def test_maps_stand_below_each_other_on_a_narrow_page() -> None:
-    """The places of their colour bars belong to what is drawn, not to the layout."""
+    """The places of their colour bars belong to the traces, not to the layout."""
     field = Map(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "peaks", "")
     panels = tuple(Panel(name, Axis("x", ""), Axis(name, ""), maps=(field,)) for name in "AB")
     second = replace(panels[1], maps=(replace(field, z=2 * field.z),))

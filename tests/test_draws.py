@@ -41,7 +41,7 @@ def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Sample]:
 
 @pytest.mark.thorough
 def test_half_of_the_stages_about_the_edge_hunt(rig: Stage) -> None:
-    """Those below it have a cycle that attracts, and no other."""
+    """Stages below the edge have a stable cycle, and others do not."""
     outcome, drawn = fate(locked(rig, "9.75 Hz +/- 1.5 Hz"), 16)
     clear = np.abs(drawn.keys[CROSSOVER] - EDGE) > 0.04  # so near, friso check too takes a transient for hunting
     assert clear.sum() >= 14
@@ -90,7 +90,7 @@ def test_cases_and_seeds(rig: Stage) -> None:
 
 
 def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
-    """Its reference never stands still: it may stick and slip, but hunts about no place."""
+    """A reference that never stands still may cause stick-slip, but no hunting about a place."""
     ramp = {"motion": {"kind": "ramp", "velocity": "0.1 m/s", "duration": "20 s"}}
     stage = locked(rig, "8 Hz +/- 1 %")
     outcome, drawn = fate(stage.replace(ramp), 8)
@@ -109,7 +109,7 @@ def made(hunts: int, settles: int, failed: int = 0, unstable: int = 0) -> Fates:
 
 
 def test_failures_widen_the_interval() -> None:
-    """As if none, and as if all of them hunted (Clopper and Pearson, by the beta distribution)."""
+    """The interval covers none and all of them hunting (Clopper and Pearson, by the beta distribution)."""
     share = made(30, 60, 10).share(("hunts",))
     assert share.probability == pytest.approx(30 / 90)
     assert share.low == pytest.approx(beta(30, 71).ppf(0.025))
@@ -166,7 +166,7 @@ def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
 
 
 def test_the_edge_of_every_draw_is_that_of_its_own_stage(rig: Stage) -> None:
-    """Each lies where the margin of that stage alone does, to the step between the bandwidths that were tried."""
+    """Each edge agrees with the margin of that stage alone, to the step between the bandwidths tried."""
     stage = locked(rig, "8 Hz")
     margin = friso.check(stage).result["given"].judgement.margin
     own = stage.flat()["friction.static"]
@@ -223,7 +223,7 @@ def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
 def test_check_draws(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], wording: Wording
 ) -> None:
-    """With correlations from the file beside it; a key made certain by --set leaves them."""
+    """Correlations come from the file beside the stage; a key made certain by --set drops out of them."""
     path = tmp_path / "stage.toml"
     friction = {"friction.static": "3 N +/- 1 %", "friction.coulomb": "1 N +/- 1 %"}
     save(locked(rig, "14 Hz +/- 1 %").replace(friction), path)

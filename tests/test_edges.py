@@ -1,4 +1,4 @@
-"""Inputs at the edges of what a float, a file or a person does: one message that says what is wrong, and at once."""
+"""Test extreme inputs, of a float, a file or a person: one message that says what is wrong, at once."""
 
 from pathlib import Path
 
@@ -47,7 +47,7 @@ def test_leaf_springs_that_no_float_holds(refused: Refused) -> None:
     [("flexure.spacing", "1e200 m"), ("controller.crossover", "1e-300 Hz"), ("friction.static", "1e300 N")],
 )
 def test_values_that_no_machine_has(key: str, value: str, refused: Refused) -> None:
-    """Where squares of them overflow, a check would end in a traceback."""
+    """If squares of them overflowed, a check would end in a traceback."""
     with refused(key):
         LEAVES.replace({key: value})
 
@@ -217,7 +217,7 @@ def test_usual_stages_raise_no_doubts(path: Path) -> None:
 
 @pytest.mark.parametrize("key", ["friction.static", "masses.cart"])
 def test_one_wrong_unit_is_questioned_in_one_sentence(key: str) -> None:
-    """Of the mass, by which friction and gains are judged, or of one friction alone."""
+    """The wrong unit is that of the mass, by which friction and gains are judged, or of one friction."""
     value = {"masses.cart": "12 g"}.get(key, "40 kN")
     (doubt,) = implausible_values(friso.load(EXAMPLES / "emps_axis.toml").replace({key: value}))
     assert doubt.startswith(f"{key} = {value} ")

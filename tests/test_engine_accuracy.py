@@ -78,7 +78,7 @@ def test_order_of_the_compiled_kernel() -> None:
 
 @ALONE
 def test_every_corner_is_a_step() -> None:
-    """With the reference known, corner times and nothing else decide the number of steps."""
+    """With the reference known, only the corner times decide the number of steps."""
     results, _, _ = fixed_steps(1.0, 0.3, MOVE)
     corners = {0.0, 0.03, 0.06, 0.1, 0.13, 0.16, 0.225, 0.3}  # 0.225: start of the window for extremes
     assert results.statistics[0, 5] == len(corners) - 1
@@ -157,8 +157,10 @@ TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, 
     ],
 )
 def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
-    """Short stretches with stops, reversals, contacts and a force at its limit; but for the law of Stribeck their
-    structures are those of other tests, whose kernels are compiled already."""
+    """Stretches are short, with stops, reversals, contacts and a force at its limit.
+
+    Except for Stribeck's law, their structures are those of other tests, whose kernels are compiled already.
+    """
     flat = chosen.flat() | changes
     if "motion.return_at" in flat:
         flat["motion.return_at"] = 0.6 * flat["motion.duration"]
@@ -191,7 +193,7 @@ def test_a_reference_that_stands_still_is_no_measure_of_length(bias: float) -> N
 @ALONE
 @pytest.mark.parametrize("duration", [0.33, 0.43, 0.46])
 def test_the_last_sample_is_taken(duration: float) -> None:
-    """Where rounding puts the end of the run an ulp before the last instant, too."""
+    """The last sample is taken even if rounding puts the end of the run just before it."""
     flat = LINEAR.flat() | MOVE | {"motion.duration": duration}
     (runs,) = run_chunks(kernel(structure(LINEAR.flat())), flat, 1, RunOptions(rtol=1e-6, interval=duration / 24))
     assert runs.results.samples.shape[1] == 25
@@ -200,7 +202,7 @@ def test_the_last_sample_is_taken(duration: float) -> None:
 
 @pytest.mark.xdist_group("rigid")
 def test_turning_points_against_a_tighter_run() -> None:
-    """On a stretch with stops: at rtol 1e-6 they are within some 1e-6 of those at 1e-11."""
+    """On a stretch with stops, at rtol 1e-6 they agree to about 1e-6 with those at 1e-11."""
     flat = VARIANTS["rigid"].flat() | {"motion.duration": 8.0}
     shape = kernel(structure(flat))
     rough, fine = (next(iter(run_chunks(shape, flat, 1, RunOptions(rtol=rtol)))).results for rtol in (1e-6, 1e-11))

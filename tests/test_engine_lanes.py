@@ -101,8 +101,10 @@ def test_any_order(native: Kernel, flat: Flat, reference: Results) -> None:
 
 
 def test_half_as_many_lanes_or_twice_as_many(native: Kernel, flat: Flat, reference: Results) -> None:
-    """One lane alone is computed by other instructions, which round differently. So are lanes in two registers, where
-    there are fused multiply-adds: SSE2, with two lanes, has none."""
+    """A single lane is computed by other instructions, which round differently.
+
+    Lanes in two registers also round differently if there are fused multiply-adds; SSE2, with two lanes, has none.
+    """
     count = native.layout.lanes // 2 if native.layout.lanes > 2 else 4
     other = kernel(structure(VARIANTS["rigid"].flat()), lanes=count)
     assert other.layout.lanes == count
@@ -147,7 +149,7 @@ def test_a_run_that_is_not_a_number_ends_at_once(native: Kernel, flat: Flat, ref
 
 
 def test_runs_of_different_length(native: Kernel, flat: Flat) -> None:
-    """Neither does the length of the others change a run."""
+    """The length of other runs does not change a run."""
     lengths = np.random.default_rng(3).uniform(0.2, 3, RUNS)
     together = run(native, flat | {"motion.duration": lengths}, BASE)
     assert_identical(

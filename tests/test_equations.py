@@ -99,7 +99,7 @@ def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleT
 
 
 def test_every_state_and_kink_matters(name: str) -> None:
-    """No dead states or kinks: each appears in the right-hand side, lets states jump, or decides on a mode."""
+    """No state or kink is dead: each is in the right-hand side, changes states, or decides on a mode."""
     used = set().union(*(sp.sympify(f).free_symbols for f in model(name).rhs))
     used |= set().union(*(switch.enter.free_symbols for switch in model(name).switches))
     used |= {kink.beyond for kink in model(name).jumps}
@@ -132,7 +132,7 @@ def test_jacobian_against_differences(name: str, twin: ModuleType) -> None:
 
 
 def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
-    """Progress names kernels: two of them are told apart by their titles."""
+    """Progress names kernels, so the titles of two kernels must differ."""
     plain = structure(rig.flat())
     control = plain.controller
     assert control is not None
@@ -159,7 +159,7 @@ def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
 
 
 def test_a_move_with_a_cruise_is_a_trapezoid_of_velocity() -> None:
-    """It accelerates, runs at constant speed for so many times as long, and brakes; both steps cover the same way."""
+    """The move accelerates, runs at constant speed for a multiple of that time, and brakes as long."""
     flat = {"motion.kind": "there_and_back", "motion.acceleration": 10.0, "motion.acceleration_time": 0.1}
     flat |= {"motion.return_at": 2.0, "motion.duration": 4.0, "motion.cruise_ratio": 1.5}
     time = np.linspace(0.0, 3.0, 30001)

@@ -1,4 +1,4 @@
-"""Findings on file: with which equations they were computed, and that documents state what is on file."""
+"""Test stored findings: their equations' revision, and that documents state the stored values."""
 
 import copy
 from pathlib import Path
@@ -32,8 +32,10 @@ def test_every_finding_names_the_code_it_rests_on() -> None:
 
 
 def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
-    """Where criteria, methods or experiments have changed since, every document that states it says of which day it is;
-    `python -m benchmarks.evidence` computes it again."""
+    """If criteria, methods or experiments have changed since, every document states the day of the finding.
+
+    `python -m benchmarks.evidence` computes it again.
+    """
     undated = [
         (name, document)
         for name in command.older_than_code(findings_on_file())

@@ -95,7 +95,7 @@ ATTRACTORS = Metric(
     counts=True,
     findings=(MapFinding("Something attracts"),),
 )
-"""A metric of numbers, computed from a sketch of what attracts a stage."""
+"""A metric of numbers, computed from a sketch of a stage's attractors."""
 
 
 def read_pairs(path: Path) -> ChannelTable:

@@ -33,7 +33,7 @@ def filtered(filters: str, controller: str | None = None) -> Stage:
 
 
 def answer(machine: Stage, s: np.ndarray, sees: str = STAGE) -> np.ndarray:
-    """From what is measured to the force."""
+    """Return the response from the measurement to the force."""
     return compensator(machine.flat(), 1).take((sees,), (FORCE,)).at(s)[0, :, 0, 0]
 
 
@@ -75,7 +75,7 @@ def test_a_notch_takes_its_depth_away_and_is_as_wide_as_stated() -> None:
 
 
 def test_paths_and_order() -> None:
-    """In a row they multiply, on either path; of a cascade those of the feedback act on the velocity alone."""
+    """In series they multiply, on either path; in a cascade those of the feedback act on the velocity alone."""
     parts = [by_hand for _, by_hand in KINDS.values()]
     row = filtered("".join(text for text, _ in KINDS.values()))
     assert answer(row, OMEGA) == pytest.approx(-np.prod([part(OMEGA) for part in parts], axis=0), rel=1e-9)
@@ -168,7 +168,7 @@ def test_a_drive_takes_a_filter_of_a_plug_in_by_its_rule(monkeypatch: pytest.Mon
 
 
 def test_a_sampled_biquad_is_its_difference_equation() -> None:
-    """At its own sample time, to rounding: the numbers of a drive's manual go in and come out."""
+    """At its own sample time it holds to rounding: the numbers of a drive's manual go in and come out."""
     b, a = [0.94, -1.85, 0.93], [-1.85, 0.87]
     machine = filtered(a_filter("sampled_biquad", numerator=b, denominator=a, sample_time="125 us"))
     errors = np.random.default_rng(2).normal(size=500)

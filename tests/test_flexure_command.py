@@ -1,4 +1,4 @@
-"""`friso flexure` as a user runs it: what it computes, says, draws and refuses."""
+"""Test `friso flexure` as a user runs it: what it computes, says, draws and refuses."""
 
 import json
 import math
@@ -367,7 +367,7 @@ def _texts(svg: str) -> list[str]:
 
 
 def _places(svg: str) -> np.ndarray:
-    """Where all texts begin or end, shape (n, 2)."""
+    """Return where all texts begin or end, shape (n, 2)."""
     items = ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")
     return np.array([[float(item.get("x", "nan")), float(item.get("y", "nan"))] for item in items])
 

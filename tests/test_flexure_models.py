@@ -69,7 +69,7 @@ THESIS = mechanism()
 
 
 def scaled(value: Any, factors: dict[str, float]) -> Any:
-    """With each number multiplied by the factor of its name."""
+    """Return a value with each number multiplied by the factor of its name."""
     changed = {}
     for item in fields(value):
         now = getattr(value, item.name)
@@ -132,7 +132,7 @@ def test_published_leaf_by_both_models(model: Any) -> None:
 
 
 def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
-    """Without lateral contraction no correction is left but that of torsion; 2.365 N/mm with 32 elements, published."""
+    """Without lateral contraction only the correction of torsion is left; 2.365 N/mm with 32 elements, published."""
     evaluation = beams(replace(THESIS, poisson=1e-9), 1e-3)
     assert evaluation.forces[-1] == pytest.approx(2.365, rel=2e-3)
     assert evaluation.drive[0] == pytest.approx(2362.5, rel=1e-3)
@@ -146,7 +146,7 @@ def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
 @MANY
 @given(springs=mechanisms(), factor=st.floats(0.1, 10))
 def test_similar_mechanisms(springs: Mechanism, factor: float) -> None:
-    """All lengths by a factor: stiffness by the factor, mass by its cube, frequency by its inverse, same stress."""
+    """Scaling all lengths scales stiffness by the factor, mass by its cube, frequency inversely; stress stays."""
     lengths = dict.fromkeys(("length", "width", "thickness", "spacing", "centre", "actuation", "sensor"), factor)
     large = scaled(springs, {**lengths, "mass": factor**3, "inertia": factor**5})
     stroke = springs.length / 100
@@ -205,7 +205,10 @@ def test_twist_of_a_deflected_leaf(springs: Mechanism, share: float) -> None:
     rigidity = springs.shear * plate.torsion_constant(springs.width, springs.thickness)
 
     def torque(s: np.ndarray) -> np.ndarray:
-        """Of a unit force along y at the end, about the middle line 3 u^2 - 2 u^3 without its linear part."""
+        """Return the torque of a unit force along y at the end, about the middle line 3 u^2 - 2 u^3.
+
+        The linear part of that line is left out.
+        """
         return 4 * delta * (s / springs.length) ** 3
 
     s = np.linspace(-half, half, 201)
@@ -252,8 +255,11 @@ def test_arrays_are_one_by_one(many: list[Mechanism]) -> None:
 
 
 def displacements(springs: Mechanism, s: np.ndarray) -> np.ndarray:
-    """How leaves move at s, from 0 at the cart to 1, per stage coordinate and with the first mode of beams between
-    clamps, all alike, at unit modal mass; `s` are the nodes of Gauss's rule; shape (leaves, points, 3, 7)."""
+    """Return how leaves move at s, from 0 at the cart to 1, shape (leaves, points, 3, 7).
+
+    The motions are per stage coordinate, and for the first mode of clamped beams, all alike, at unit modal mass; `s`
+    are the nodes of Gauss's rule.
+    """
     place, slope = 3 * s**2 - 2 * s**3, springs.length * (s**3 - s**2)
     root = brentq(lambda x: np.cos(x) * np.cosh(x) - 1, 4.5, 5.0)
     first, second = np.sinh(root) - np.sin(root), np.cos(root) - np.cosh(root)
@@ -337,7 +343,10 @@ def test_lateral_load_without_dimensions() -> None:
 
 
 def lateral_load_without_warping(springs: Mechanism) -> float:
-    """That of leaves whose clamps forbid them to warp (Vlasov), by Ritz's method: theta = theta' = 0 at the clamps."""
+    """Return the lateral load of leaves whose clamps forbid them to warp (Vlasov), by Ritz's method.
+
+    At the clamps, theta = theta' = 0.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     x, weights = (nodes + 1) / 2, weights / 2
     base = [Polynomial([0, 0, 1, -2, 1]) * Polynomial([-1, 2]) ** n for n in range(12)]
@@ -391,7 +400,7 @@ def test_numbers_that_make_no_mechanism_are_nan() -> None:
 
 
 def test_drive_mode_of_a_heavy_stage() -> None:
-    """On narrow leaves a long stage turns about z more slowly than it is driven."""
+    """On narrow leaves a long stage turns about z more slowly than it moves along the drive."""
     springs = mechanism(0.06, 0.01, 0.3e-3, spacing=0.03, mass=3.0)
     by_beams, by_closed = beams(springs, 1e-3).modes[0], closed_form_model(springs, 1e-3).modes[0]
     assert by_beams.name == by_closed.name == "drive"
@@ -458,7 +467,7 @@ class Pushed:
         return np.concatenate([move[:3] + rotation.apply(arms) - arms, angles], axis=1)
 
     def slopes(self, move: np.ndarray, turn: float) -> np.ndarray:
-        """How these follow the stage, shape (leaves, 6, 6)."""
+        """Return how leaf ends follow the stage, shape (leaves, 6, 6)."""
         steps = 1e-6 * np.eye(6)
         return np.stack([self.ends(move + h, turn) - self.ends(move - h, turn) for h in steps], axis=2) / 2e-6
 
@@ -478,7 +487,10 @@ class Pushed:
         return np.array([(self.forces(move + h, turn) - self.forces(move - h, turn)) / (2 * h.sum()) for h in steps]).T
 
     def to(self, stroke: float, steps: int) -> tuple[np.ndarray, float]:
-        """Where the stage is at this z [m], free along x and about y: Newton's method on all that is free at once."""
+        """Return where the stage is at this z [m], free along x and about y.
+
+        Newton's method solves for all free coordinates at once.
+        """
         x, turn, rate, last = 0.0, 0.0, 0 * self.state, 0.0
         for z in stroke * np.linspace(0, 1, steps + 1)[1:] ** 2:
             before, state = self.state, self.state + (z - last) * rate
@@ -530,7 +542,7 @@ def test_mirrored_motion(leaves: int) -> None:
 
 @pytest.mark.parametrize("leaves", [3, 4])
 def test_more_leaves(leaves: int) -> None:
-    """Each leaf bears its share; the leaves of a row move alike where the stage does not turn."""
+    """Each leaf bears its share; the leaves of a row move alike if the stage does not turn."""
     two, more = beams(THESIS, 1e-3), beams(mechanism(leaves=leaves), 1e-3)
     for name in ("forces", "drive", "support_x", "support_y"):
         assert getattr(more, name) == pytest.approx(leaves / 2 * getattr(two, name), rel=2e-3)
@@ -549,7 +561,7 @@ def test_elements_converge() -> None:
 
 
 def test_modes_have_unit_modal_mass_and_are_orthogonal() -> None:
-    """As far as the stage, by far the heaviest part, tells."""
+    """The modes are orthogonal as far as the stage shows, by far the heaviest part."""
     evaluation = beams(replace(THESIS, density=1.0), 1e-3)
     of_stage = [mode for mode in evaluation.modes if np.linalg.norm(mode.stage) > 0.1]
     shapes = np.array([mode.stage for mode in of_stage]).T

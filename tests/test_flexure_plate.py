@@ -32,7 +32,7 @@ def test_one_function_across_is_exact(ratio: float, poisson: float) -> None:
 @FEW
 @given(ratio=SLENDER, poisson=METAL)
 def test_share_that_converges(ratio: float, poisson: float) -> None:
-    """Of the stiffening: 0.866 to 0.901 for metals."""
+    """The fraction of the stiffening is 0.866 to 0.901 for metals."""
     expected = (plate.stiffening(ratio, 1.0, poisson) - 1) / plate.CONVERGED
     assert (ritz(ratio, 1.0, poisson).stiffening - 1) / expected == pytest.approx(plate.CONVERGED, abs=0.025)
 
@@ -78,7 +78,7 @@ def test_without_lateral_contraction_a_leaf_is_a_beam() -> None:
 @given(ratio=SLENDER, poisson=POISSON)
 @settings(max_examples=30)
 def test_profile_has_the_stiffness_of_the_plate(ratio: float, poisson: float) -> None:
-    """The compliance along the leaf, weighted by the square of the moment, is that of the whole."""
+    """The compliance along the leaf, weighted by the square of the moment, equals that of the whole."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     s = nodes * ratio * WIDTH / 2
     profile = plate.compliance_profile(s, ratio * WIDTH, WIDTH, poisson)

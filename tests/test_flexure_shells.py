@@ -32,7 +32,7 @@ MECHANISMS = {
     "stiff": (2, 45, 45, 0.5, 45, "spring steel", 1.0, -10),
 }
 LIMITS = {"drive": 0.02, "support": 0.05, "turning": 0.05, "frequency": 0.05, "stress": 0.03, "buckling": 0.02}
-"""Largest errors allowed, by the first word of what is compared."""
+"""Largest errors allowed, by the first word of the compared quantity."""
 
 TWISTED = {"turning about z, deflected": 0.1}
 """Less is known of turning the stage on deflected leaves, which twists them."""
@@ -69,8 +69,11 @@ def mechanism(name: str) -> Mechanism:
 
 @cache
 def by_shells(name: str, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
-    """What shells say: stiffness [N/m, N m] straight and deflected by L/50, frequencies [Hz], stress [Pa] at L/100,
-    buckling load [N]."""
+    """Return results of shells.
+
+    They are stiffness [N/m, N m] straight and deflected by L/50, frequencies [Hz], stress [Pa] at L/100, and buckling
+    load [N].
+    """
     example = mechanism(name)
     sheet = shells.Sheet(
         example.length, example.width, example.thickness, example.young, example.poisson, example.density
@@ -111,7 +114,7 @@ def stiffnesses(straight: np.ndarray, bent: np.ndarray) -> dict[str, float]:
 
 
 def by_model(evaluation: Evaluation, half: Evaluation) -> dict[str, float]:
-    """What a model says at strokes of L/50 and L/100."""
+    """Return results of a model at strokes of L/50 and L/100."""
     results = {"stress": half.stress, "buckling": evaluation.buckling} | stiffnesses(*evaluation.stiffness)
     for mode in evaluation.modes:
         results.setdefault(f"frequency, {mode.name.split(',')[0]}", mode.frequency)

@@ -1,4 +1,4 @@
-"""The [flexure] table of stage files: what follows from it, and what is refused."""
+"""Test the [flexure] table of stage files: what follows from it, and what is refused."""
 
 from pathlib import Path
 from typing import Any
@@ -75,7 +75,7 @@ def resonances(stage: Stage) -> tuple[np.ndarray, np.ndarray]:
     ],
 )
 def test_the_plant_resonates_as_the_beams_do(stage: Stage, changes: dict[str, str], kind: str) -> None:
-    """In the mode that stands highest, with its frequency and residue."""
+    """The plant resonates in its highest mode, with the beams' frequency and residue."""
     changed = stage.replace(changes)
     modes = beams(Mechanism.of(changed.flat()), 1e-3).modes[1:]
     mode = max(modes, key=lambda item: abs(item.actuator * item.sensor) / item.frequency**2)

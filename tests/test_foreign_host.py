@@ -1,4 +1,4 @@
-"""What friso does on Windows and on macOS, as far as that can be seen without them (foreign_host/sitecustomize.py)."""
+"""Test friso on Windows and on macOS, as far as possible without them (foreign_host/sitecustomize.py)."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def started(
 
 
 def friso(host: str, folder: Path, *arguments: object, status: int = 0, **variables: str) -> str:
-    """What it prints, or on which it says why it fails; the status is that."""
+    """Return what friso prints, or why it fails, with the expected status."""
     with started(host, folder, *arguments, **variables) as process:
         out, err = process.communicate()
     assert process.returncode == status, err
@@ -117,7 +117,7 @@ def test_files_are_replaced_unless_another_program_holds_them(host: str, axis: P
 
 
 def test_folders_in_which_windows_lets_nothing_be_made_are_refused_at_once(axis: Path) -> None:
-    """Neither the mode of such a folder tells, nor os.access. Nothing is computed: that would compile."""
+    """Neither the folder's mode nor os.access shows it. Nothing is computed, because that would compile."""
     (axis / "read-only").mkdir()
     kernels = axis / "kernels"
     for out in (("--out", "read-only/run"), ("--out", "read-only")):

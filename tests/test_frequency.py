@@ -37,7 +37,7 @@ HZ = 2 * np.pi
 
 
 def magnitude(system: control.StateSpace, output: str, frequency: float) -> float:
-    """Of one output over the force on the stage."""
+    """Return the magnitude of one output over the force on the stage."""
     row, column = system.output_labels.index(output), system.input_labels.index("force")
     return abs(system(2j * np.pi * frequency)[row, column])
 
@@ -118,7 +118,7 @@ def derived(form: Structure) -> tuple[Model, Callable[..., Any]]:
 
 
 def jacobian(flat: dict, one: Members) -> np.ndarray:
-    """Of the right-hand side of a stage with its controller, at a state that is put in by hand."""
+    """Return the Jacobian of the right-hand side of a stage with its controller, at a given state."""
     model, derivatives = derived(structure(flat))
     speed = float(one.speed[0])
     here = {symbol: speed if str(symbol).endswith("velocity") else 0.0 for symbol in model.symbols}
@@ -238,8 +238,10 @@ CASES = ("stuck", "sliding", "stuck-touched", "sliding-touched")
 
 
 def growing(flat: dict, one: Members) -> int:
-    """Closed-loop poles in the right half-plane of a loop in continuous time, by how often 1 + L turns round 0 along a
-    line just right of the imaginary axis (Nyquist), with the delay as it is."""
+    """Return the number of closed-loop poles in the right half-plane, with the exact delay.
+
+    It is how often 1 + L turns round 0 along a line just right of the imaginary axis (Nyquist), in continuous time.
+    """
     exact_poles = poles(flat, one, DriveTiming(0.0, 0.0))
     aside = 1e-3 * np.abs(exact_poles.closed).min()
     resonant = np.abs(np.concatenate([exact_poles.closed[0], exact_poles.cut[0]]).imag)
@@ -348,7 +350,7 @@ def test_a_sampled_loop_is_the_sum_of_its_aliases(rig: Stage) -> None:
 
 
 def test_sampling_ever_faster_is_continuous(rig: Stage) -> None:
-    """Poles of the sampled loop go to those of the continuous one with the sample time: half a sample of delay."""
+    """Poles of the sampled loop approach those of the continuous one: half a sample of delay."""
     flat, one = rig.flat(), limit_cases(rig.flat())["sliding"]
     exact = poles(flat, one, DriveTiming(0.0, 0.0)).in_s[0]
     slow = exact[np.abs(exact) < 2000]
@@ -379,7 +381,7 @@ def test_a_delay_too_long_is_refused(rig: Stage, refused: Refused) -> None:
 
 
 def test_a_delay_is_lag(rig: Stage) -> None:
-    """At its delay margin a loop is on the edge, by the rational stand-in for the delay too."""
+    """At its delay margin a loop is on the edge of stability, also with the rational approximation."""
     flat, one = rig.flat(), limit_cases(rig.flat())["sliding"]
     margin = margins(flat, one).delay_margin
     early, late = (margins({**flat, "drive.delay": share * margin}, one).stable for share in (0.999, 1.001))
@@ -420,8 +422,11 @@ def by_gains(rig: Stage, **gains: str) -> Stage:
 )
 @pytest.mark.parametrize("turn", [1e-10, 1e-8, 1e-5, 1e-4])
 def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive: DriveTiming) -> None:
-    """Stuck, an integral acts on a spring: its pole, so many radians in the delay, is neither lost in the rounding of
-    the fast ones nor taken where it is without delay."""
+    """If stuck, an integral acts on a spring.
+
+    Its pole, with a given phase in the delay, must neither be lost in the rounding of the fast poles nor be taken
+    without delay.
+    """
     rigid = by_gains(rig, kp="0 N/m", ki="1 N/(m*s)").replace({"joint.locked": True, "parasitic": None})
     one = limit_cases(rigid.flat())["stuck"]
     speed = 1e-3 * abs(response(rigid.flat(), one, DriveTiming(0.0, 0.0))(np.array([1e-3]))[0])

@@ -1,4 +1,4 @@
-"""What holds for every friction law, and the invariants of LuGre (Astrom & Canudas de Wit 2008)."""
+"""Test what holds for every friction law, and the invariants of LuGre (Astrom & Canudas de Wit 2008)."""
 
 import ast
 from pathlib import Path
@@ -36,7 +36,7 @@ def test_every_law_is_among_the_common_variants(law: str) -> None:
 
 @pytest.mark.parametrize("file", [*sorted(LAWS.glob("*.py")), Path(maxwell_slip.__file__)], ids=lambda file: file.stem)
 def test_a_law_mentions_no_solver(file: Path) -> None:
-    """One file, which imports units, the stage's tables and the ground of the equations only."""
+    """A law is one file, which imports only units, the stage's tables and the basis of the equations."""
     nodes = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ImportFrom)]
     ours = {node.module for node in nodes if node.module and node.module.startswith("friso")}
     allowed = tuple(f"friso.{name}" for name in ("quantities", "stage", *map("equations.{}".format, GROUND)))
@@ -64,8 +64,10 @@ def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_
 @pytest.mark.inner
 @pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", NARROW_PLAY)])
 def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
-    """Beside friction that falls by two thirds, over speeds far above those of small swings; in a backlash of less than
-    a thousandth of the deflection of the loop cycles may be smaller than the search covers."""
+    """Friction falls by two thirds at speeds far above those of small swings.
+
+    In a backlash below a thousandth of the loop's deflection, cycles may be smaller than the search covers.
+    """
     screw = {"mass": "2 kg", "stiffness": "20 N/um", "damping": "400 N*s/m", "backlash": play}
     tables = {"transmission": screw, "encoder": {"position": "load", "velocity": "load"}}
     stages = Ensemble.held(VARIANTS["rigid"].replace(tables).flat(), 1)
@@ -102,7 +104,7 @@ def test_bristles_never_deflect_further_than_static_friction(
 
 
 def energy_loss(flat: dict[str, Any], samples: np.ndarray) -> np.ndarray:
-    """Power that friction takes less what its bristles store, F v - sigma_0 z z' [W], at every sample."""
+    """Return the power lost in friction [W] at every sample: F v less what bristles store, sigma_0 z z'."""
     losses = []
     for v, z in samples[:, 1:3]:
         force, z_rate = plain.friction(flat, v, z)
@@ -134,7 +136,7 @@ def test_the_thesis_values_are_not_passive() -> None:
 
 
 def swing_heights(results: Results) -> np.ndarray:
-    """Turning points that stand out: those of the ringing at a stop are left out."""
+    """Return distinct turning points, without the ringing at a stop."""
     values = results.turn_values[0, : results.turn_counts[0]]
     sides = np.split(values, np.flatnonzero(np.diff(np.sign(values))) + 1)
     farthest = [part[np.argmax(np.abs(part))] for part in sides]
@@ -142,7 +144,7 @@ def swing_heights(results: Results) -> np.ndarray:
 
 
 def turns(results: Results) -> np.ndarray:
-    """Turning points but those of rounding noise about a rest at zero."""
+    """Return turning points, without rounding noise about a rest at zero."""
     values = results.turn_values[0, : results.turn_counts[0]]
     return values[np.abs(values) > 1e-14]
 

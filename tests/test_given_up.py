@@ -1,4 +1,4 @@
-"""What was given up or is not certain is not told as sure: verdicts that rest on made-up surveys and runs."""
+"""Test that results given up or uncertain are not called sure, with made-up surveys and runs."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -52,7 +52,7 @@ NONE = replace(HUNTING, windows=())
 
 
 def displaced(hunts: Any, completed: Any, swing: float = 0.0) -> Kick:
-    """What is made of kicks that hunt, and of which runs were completed, by functions of their size [m]."""
+    """Return the kick windows, if functions of the kick [m] say which kicks hunt and which runs completed."""
 
     def ends_in(flat: Any, count: int, *_: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         kicks = flat["motion.displacement"]
@@ -78,7 +78,7 @@ def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
 
 
 def test_kicks_after_which_swings_are_far_larger_than_what_attracts_make_no_window() -> None:
-    """They may grow, or die out: without anti-windup that takes long."""
+    """Such large swings may grow or die out, which takes long without anti-windup."""
     kick = displaced(beyond(2e-3), beyond(0), swing=0.5)
     assert kick.unknown > 0
     assert kick.searched[1] == kick.windows[-1][1] < 8e-3
@@ -96,7 +96,7 @@ def surveyed(complete: bool) -> Attractors:
 
 
 def run_to(settling: float, swing: float = 0.0) -> Any:
-    """As much of the measures of the stage's own motion as a verdict looks at."""
+    """Return measures of the stage's own motion, as far as a verdict needs them."""
     return SimpleNamespace(
         status=np.array([Status.DONE]),
         peaks=np.zeros(1),
@@ -214,8 +214,10 @@ def test_of_a_stage_that_hunts_at_all_higher_bandwidths_the_lower_ones_alone_are
 
 @pytest.mark.parametrize(("budget", "work"), [(100, np.inf), (2_000_000, 1e5)])
 def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, work: float) -> None:
-    """Of a motion that has not settled at its end: the longer run is out of its own steps, or out of the work that is
-    allowed. Nothing attracts, as far as is known, but this motion was not seen to come to rest."""
+    """The motion has not settled at its end, and the longer run runs out of steps or of allowed work.
+
+    No attractor is known, but this motion was not seen to come to rest.
+    """
     resting = fake_hunting(reason="")
     attraction = replace(resting, surveyed=surveyed(complete=True))
     made_up = {

@@ -52,8 +52,10 @@ def compiled() -> None:
 
 
 def test_inner_loops_close_to_rounding() -> None:
-    """Where the level does not depend on speed, every deflection is that of a spring that slips at its strength, drawn
-    along the same path: with loops within loops, each forgotten once it has closed."""
+    """If the level does not depend on speed, each deflection is that of a spring that slips at its strength.
+
+    The path has loops within loops, each forgotten once it has closed.
+    """
     response = friso.simulate(HELD, 1e-10, 2e-5)
     reference = np.interp(response.turning_time, response.time, response.reference)
     times = np.concatenate([response.time, response.turning_time])
@@ -71,7 +73,7 @@ def test_inner_loops_close_to_rounding() -> None:
 
 
 def test_masing_s_rule() -> None:
-    """From a turn with everything slipping, the force follows the virgin curve at twice its size."""
+    """From a turn with all elements slipping, the force follows the virgin curve at twice its size."""
     response = friso.simulate(SLIDES, 1e-10, 2e-6)
     (first, second), positions = response.turning_time.values[:2], response.position.values
     branch = np.flatnonzero((response.time.values > first) & (response.time.values < second))
@@ -140,7 +142,7 @@ def test_the_cycle_against_simulation_and_scipy_with_events() -> None:
 
 
 def test_describing_function_of_elements() -> None:
-    """Of each: k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
+    """Each element has k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
     amplitudes, limits = np.array([2e-6, 1e-5, 3e-5, 1e-3]), 2 * SHARE / STIFFNESS
     table = describing(HELD, amplitudes, [3.0])
     assert set(np.ravel(table.status)) == {"done"}
@@ -180,7 +182,7 @@ def test_bad_lists_are_refused(changes: dict[str, Any], message: str) -> None:
 
 
 def test_it_may_give_energy_back_where_friction_falls() -> None:
-    """As much as the elements are loaded without a displacement when a slip slows down."""
+    """GMS elements return energy that they store without displacement while a slip slows down."""
     flat = HUNTS.flat()
     assert "static = coulomb" in GeneralisedMaxwellSlip.active(flat)
     assert not GeneralisedMaxwellSlip.active(HELD.flat())
@@ -189,7 +191,7 @@ def test_it_may_give_energy_back_where_friction_falls() -> None:
 
 
 def test_many_elements_come_near_a_smooth_curve() -> None:
-    """With the square of their number."""
+    """The error falls with the square of their number."""
     curve = measure_friction(VARIANTS["rigid"].flat())
     off = []
     for count in (4, 8, 16, 32):

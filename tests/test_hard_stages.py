@@ -31,7 +31,7 @@ def groups() -> dict[str, list[dict[str, Any]]]:
 
 
 def established(entry: dict[str, Any]) -> tuple[str, ...]:
-    """The verdicts that agree with what is known of a stage."""
+    """Return the verdicts that agree with what is known of a stage."""
     if not entry["attracts"]:
         return ("settles", "transient")
     return ("hunts",) if entry["own_motion"] == "swings" else ("bistable",)
@@ -50,5 +50,5 @@ def test_verdicts_near_the_edge(kind: str) -> None:
 
 
 def test_both_kinds_are_among_them() -> None:
-    """Else a verdict that is always the same would pass."""
+    """Otherwise a constant verdict would pass."""
     assert {entry["attracts"] for entry in ENTRIES} == {True, False}

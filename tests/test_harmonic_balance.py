@@ -100,7 +100,7 @@ def test_singular_step_stays(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_frequencies_are_close_enough_for_the_loop() -> None:
-    """With the joint locked the loop turns by 143 degrees from one of the usual frequencies to the next at 224 Hz."""
+    """With the joint locked the loop turns by 143 degrees between two usual frequencies at 224 Hz."""
     locked = hunting(8.0, LOCKED, PARASITIC)
 
     def turn(frequencies: np.ndarray) -> float:
@@ -115,7 +115,7 @@ def test_frequencies_are_close_enough_for_the_loop() -> None:
 
 
 def test_multi_harmonic_balance_finds_it_too() -> None:
-    """With one harmonic it is single-harmonic balance; with many, it is a motion that comes back to where it starts."""
+    """With one harmonic it equals single-harmonic balance; with many, the motion comes back to its start."""
     amplitude, omega = near_sine()
     times = np.arange(1024) * 2 * np.pi / omega / 1024
     flat = unstable("1e5 N/m").flat()
@@ -178,8 +178,10 @@ def test_derivative_of_the_force_by_the_motion() -> None:
 
 
 def test_receptance_is_that_of_the_closed_loop() -> None:
-    """One mass: x = -F/(m s^2 + C(s)), with the controller of Eq. 7 and 8 written out; at 0.1 mHz the integrator has
-    ten orders of magnitude on the mass."""
+    """For one mass, x = -F/(m s^2 + C(s)), with the controller of Eq. 7 and 8 written out.
+
+    At 0.1 mHz the integrator exceeds the mass by ten orders of magnitude.
+    """
     frequencies = np.array([1e-4, 0.3, 5.0, 40.0])
     s, omega = 2j * np.pi * frequencies, 2 * np.pi * 8.0
     tau_z, k_p = np.sqrt(10) / omega, 1.7 * omega**2 / np.sqrt(10)
@@ -196,7 +198,7 @@ def test_receptance_is_that_of_the_closed_loop() -> None:
 
 @pytest.mark.thorough
 def test_hunting_by_harmonic_balance() -> None:
-    """No cycle by one harmonic; by many, 0.6 % of the amplitude are left at the 101st, 0.01 % at the 201st."""
+    """One harmonic finds no cycle; with many, the amplitude is off by 0.6 % at the 101st, 0.01 % at the 201st."""
     result = harmonic_balance(hunting(8.0), [8.0], (1, 25, 51, 101, 201)).squeeze()
     assert float(result["period"]) == pytest.approx(1.62757, abs=1e-4)
     assert float(result["amplitude"]) == pytest.approx(0.5202e-3, rel=1e-3)

@@ -35,7 +35,7 @@ def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
 
 
 def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_scatter(rig: Stage) -> None:
-    """That of the thesis's rig passes -1 at 5.599, 5.609 and 5.614 Hz: which of them is met depends on the start."""
+    """The thesis rig's multiplier passes -1 at 5.599, 5.609 and 5.614 Hz; the start decides which is met."""
     flat = rig.replace({"joint.locked": False}).flat()
     for crossover in (5.45, 5.5):
         at = crossover / flat["controller.crossover"]
@@ -51,8 +51,10 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
 
 
 def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig: Stage) -> None:
-    """Not where the multiplier, over a hundredth of the distance, is 1 (3.64663 Hz). At 1e-9, begun beside the cycle,
-    the stage still swings after 400 periods at 3.6468 Hz, and rests at 3.647 Hz."""
+    """The fold lies elsewhere than where the multiplier over a hundredth of the distance is 1 (3.64663 Hz).
+
+    At 1e-9, started beside the cycle, the stage still swings after 400 periods at 3.6468 Hz, and rests at 3.647 Hz.
+    """
     joint = {"joint.locked": False, "joint.stiffness": "50 N/mm", "joint.stroke": "50 um"}
     leaning = rig.replace({**joint, "friction.asymmetry": 0.1, "controller.crossover": "3.63 Hz"})
     flat = leaning.flat()

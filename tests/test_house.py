@@ -29,8 +29,8 @@ KNOW_CONTROLLERS = (
     *("equations/controllers/", "drives/formats/", "stage/stage.py", "stage/standstill.py", "templates/"),
     "identification/state_space_controller.py",
 )
-"""Where keys of a controller may be named: its own files (one that reads logs stands beside their readers), the stage
-file's schema, the template of one, and parameter files of drives, which are translated into friso's controllers."""
+"""Where keys of a controller may be named: its own files (one that reads logs stands beside their readers), the schema
+of the stage file, its template, and drives' parameter files, which become friso's controllers."""
 
 ABOUT_TUNING = (
     *(
@@ -53,7 +53,7 @@ RECIPES = {
     "doubt about a log": "identification/doubts",
     "parameter file": "drives/formats",
 }
-"""What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
+"""What CONTRIBUTING.md explains how to add, and the folder for its file."""
 
 
 SHOWN_BY = {
@@ -66,7 +66,7 @@ SHOWN_BY = {
 """Methods of answers to the modules of a question's folder that show them, and what those take beside the answer."""
 
 INTERFACE = {module.__name__: {*module.__all__} for module in (hunting, criteria, measures)}
-"""What friso.hunting offers to other floors, to benchmarks, and to tests that are not of its inner modules."""
+"""What friso.hunting offers to other floors, to benchmarks, and to tests outside its inner modules."""
 
 NARRATORS = {"found", "known", "told", "given", "each", "it"}
 """Names that do not say what a value is."""
@@ -76,7 +76,7 @@ LEFT = 38
 
 
 def sources() -> dict[str, str]:
-    """Modules by their path in friso; those of the thesis by the name of their package too."""
+    """Return modules by their path in friso; the thesis's with the name of their package."""
     places = {path: path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py")}
     places |= {path: path.relative_to(THESIS.parent) for path in THESIS.rglob("*.py")}
     return {place.as_posix(): path.read_text(encoding="utf-8") for path, place in places.items()}
@@ -147,7 +147,7 @@ def test_names_of_values_say_what_they_hold(folder: str) -> None:
 
 
 def test_percentages_are_written_by_one_function() -> None:
-    """Neither by the format of an f-string nor by hand; `quantities.percent` and `prefixes.percentage` are it."""
+    """Percentages come from `quantities.percent` or `prefixes.percentage`, not from f-strings or hand-written text."""
     by_hand = []
     for name, source in sources().items():
         for node in ast.walk(ast.parse(source)):
@@ -183,7 +183,7 @@ def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
 
 
 def test_what_shows_an_answer_takes_what_answers_hand_over() -> None:
-    """Where the class of an answer leaves a method to a function of its question's folder, that takes the subject."""
+    """If an answer's class leaves a method to a function of its question's folder, that function takes the subject."""
     wrong = []
     for name, question in QUESTIONS.items():
         module = importlib.import_module(question.module)
@@ -200,7 +200,7 @@ def test_what_shows_an_answer_takes_what_answers_hand_over() -> None:
 
 @pytest.mark.parametrize("kind", RECIPES)
 def test_there_is_a_recipe(kind: str) -> None:
-    """A heading for what is added, and below it the folder of its file."""
+    """The guide has a heading for what is added, and below it the folder of its file."""
     sections = GUIDE.read_text(encoding="utf-8").split("\n#")
     recipes = [section for section in sections if kind in section.partition("\n")[0].lower()]
     assert any(f"friso/{RECIPES[kind]}/" in recipe for recipe in recipes)

@@ -1,6 +1,7 @@
-"""Hunting cycles against references.md, section 2, against simulations, and against what symmetry and scaling demand.
+"""Test hunting cycles against references.md, section 2, simulations, symmetry and scaling.
 
-The multipliers of references.md are of the half-cycle return map; those of the rigid mass come from shooting at 1e-12.
+The multipliers of references.md belong to the half-cycle return map; those of the rigid mass come from shooting at
+1e-12.
 """
 
 from functools import cache
@@ -47,7 +48,7 @@ TIGHT = 1e-11
 """Relative tolerance of a result that counts as exact."""
 
 BRISTLES = 3 / 1e5
-"""How far the bristles deflect before they slip [m]: static friction over their stiffness."""
+"""Deflection [m] at which the bristles slip: static friction over their stiffness."""
 
 
 def rigid(crossover: float, **changes: Any) -> Stage:
@@ -75,7 +76,7 @@ def only(chosen: Stage, rtol: float = CYCLE_RTOL) -> Cycle:
 
 @RIGID
 def test_what_attracts_one_stage_is_what_its_flat_keys_tell() -> None:
-    """As large and as long as the cycle that attracts; nothing beyond its edge."""
+    """Amplitude and period equal those of the stable cycle; beyond its edge there is nothing."""
     stage = rigid(4)
     (swing,), cycle = find_swings(stage.flat()), only(stage)
     assert (swing.amplitude, swing.period) == pytest.approx((cycle.amplitude, cycle.period), rel=1e-9)
@@ -97,7 +98,7 @@ def test_reference_cycle_of_a_rigid_mass() -> None:
 
 @RIGID
 def test_reference_cycle_at_the_tolerance_in_use() -> None:
-    """At 1e-9 still eight digits of period and amplitude, and five of the multiplier."""
+    """At 1e-9, period and amplitude still have eight digits, and the multiplier five."""
     cycle = only(rigid(4))
     assert cycle.period == pytest.approx(3.15031069, abs=1e-8)
     assert cycle.amplitude == pytest.approx(2.0166608e-3, abs=1e-10)
@@ -137,7 +138,7 @@ COMPUTED = [
 def test_cycles_of_the_rig_stay_what_they_were(
     crossover: float, amplitude: float, multiplier: float, joint: str
 ) -> None:
-    """To the digits given, as found when this was written: no reference, but what maps and verdicts rest on."""
+    """Values hold to the given digits, as when this was written: no reference, but maps and verdicts rest on them."""
     cycle = only(rig(crossover, joint))
     assert 1e3 * cycle.amplitude == pytest.approx(amplitude, abs=1e-6)
     assert cycle.multiplier == pytest.approx(multiplier, abs=2e-5)
@@ -146,7 +147,7 @@ def test_cycles_of_the_rig_stay_what_they_were(
 @RIGID
 @pytest.mark.parametrize(("crossover", "attracting"), [(8, True), (12, False)])
 def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
-    """Its cycle stops attracting near 9.77 Hz: found from below and from above, where the multiplier passes -1."""
+    """The cycle becomes unstable near 9.77 Hz: found from below and from above, where the multiplier passes -1."""
     edge = find_margin(rigid(crossover), attracting)
     assert edge is not None
     assert edge.crossover is not None
@@ -203,7 +204,7 @@ def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multipl
 
 @RIGID
 def test_asymmetric_pair_shrinks_into_the_flip() -> None:
-    """Its multiplier falls to 1 and its turns approach each other like the root of the distance to the flip."""
+    """The pair's multiplier falls to 1, and its turns approach each other like the root of the distance to the flip."""
     off = {}
     for crossover in (9.65, 9.74):
         result = hunting_of(rigid(crossover))
@@ -249,8 +250,10 @@ CONVERGING = [
 
 @pytest.mark.parametrize("chosen", CONVERGING)
 def test_results_do_not_depend_on_the_tolerance(chosen: Stage) -> None:
-    """From rtol 1e-9 to 1e-11: period and amplitude to 1e-6 (to 1e-7 in the free rig at 3 Hz, 1e-8 elsewhere), and the
-    multiplier that decides to 1e-4."""
+    """From rtol 1e-9 to 1e-11, period and amplitude agree to 1e-6, and the deciding multiplier to 1e-4.
+
+    In the free rig at 3 Hz they agree to 1e-7, elsewhere to 1e-8.
+    """
     for rough, fine in zip(hunting_of(chosen).cycles, hunting_of(chosen, TIGHT).cycles, strict=True):
         assert rough.period == pytest.approx(fine.period, rel=1e-6)
         assert rough.amplitude == pytest.approx(fine.amplitude, rel=1e-6)
@@ -268,9 +271,11 @@ def test_orbits_are_closed_at_a_rough_tolerance_too() -> None:
 
 @FREE_RIG
 def test_a_chattering_limiter_has_a_slope_but_no_smooth_flow() -> None:
-    """At 5 Hz the Floquet multiplier converges too, but is that of a stretch much shorter than the cycle: over 1 % of
-    the amplitude the return map is straighter and flatter. At 3 Hz the limiter is touched some thirty times a swing;
-    the Floquet multiplier depends on the tolerance by percents, and only the slope means anything."""
+    """At 5 Hz the Floquet multiplier converges too, but belongs to a much shorter stretch than the cycle.
+
+    Over 1 % of the amplitude the return map is straighter and flatter. At 3 Hz the limiter is touched some thirty times
+    a swing; the Floquet multiplier depends on the tolerance by percents, and only the slope means anything.
+    """
     for crossover, depends in ((5, 1e-5), (3, 0.2)):
         rough, fine = only(rig(crossover, free())), only(rig(crossover, free()), TIGHT)
         assert rough.multiplier == rough.slope
@@ -280,7 +285,7 @@ def test_a_chattering_limiter_has_a_slope_but_no_smooth_flow() -> None:
 
 
 def machine(rng: np.random.Generator) -> dict[str, Any]:
-    """A rigid machine: masses, friction and controller drawn from ranges about those of the thesis."""
+    """Draw a rigid machine: masses, friction and controller from ranges around the thesis's."""
     cart, table, static = rng.uniform(0.5, 3), rng.uniform(0.2, 2), rng.uniform(1, 6)
     return {
         "masses.cart": f"{cart!r} kg",
@@ -305,9 +310,9 @@ def machines() -> list[Stage]:
 
 @RIGID
 def test_multipliers_of_machines_drawn_at_random() -> None:
-    """Floquet multiplier, slope of the simulated return map and growth beside the cycle: three ways to one number.
+    """Floquet multiplier, slope of the simulated return map, and growth beside the cycle are equal.
 
-    The slope is that of 1 % of the amplitude, hence 1 %; it agrees to some 1e-5.
+    The slope is taken over 1 % of the amplitude, hence 1 %; it agrees to some 1e-5.
     """
     cycles = [only_symmetric(hunting_of(item)) for item in machines() if hunting_of(item).cycles]
     judged = [cycle for cycle in cycles if abs(cycle.multiplier) < 2]
@@ -321,9 +326,11 @@ def test_multipliers_of_machines_drawn_at_random() -> None:
 
 @RIGID
 def test_machines_drawn_at_random_hunt_as_their_cycles_say() -> None:
-    """Let go at 32 displacements from 0.1 to 30 mm and followed for a hundred periods: a machine without a cycle that
-    attracts comes to rest from all; one that has one swings as far as it from some, to what is left of the transient,
-    and rests after the others."""
+    """Machines are released at 32 displacements from 0.1 to 30 mm and followed for a hundred periods.
+
+    Without a stable cycle, they rest after all; otherwise they swing as far as the cycle after some, within the
+    remaining transient, and rest after the others.
+    """
     for item in machines():
         result = hunting_of(item)
         period = result.cycles[0].period if result.cycles else 4.0
@@ -367,7 +374,7 @@ def test_trace_of_a_symmetric_cycle(chosen: Stage, share: float) -> None:
 
 
 def moving_parts(trace: xr.Dataset) -> dict[str, np.ndarray]:
-    """The traces but that of the reference, which stays at zero."""
+    """Return the traces without that of the reference, which stays at zero."""
     assert np.all(trace.reference == 0)
     return {str(name): signal.to_numpy() for name, signal in trace.items() if name != "reference"}
 
@@ -381,7 +388,7 @@ def moving_parts(trace: xr.Dataset) -> dict[str, np.ndarray]:
     ],
 )
 def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
-    """To 1e-6 of the range of each signal; the orbit closes to 1e-8 and its trace is followed at rtol 1e-8."""
+    """The trace repeats to 1e-6 of each signal's range; the orbit closes to 1e-8, and the trace is run at rtol 1e-8."""
     (cycle,) = (item for item in hunting_of(chosen).cycles if not item.symmetric)
     for name, signal in moving_parts(cycle.trace).items():
         assert abs(signal[-1] - signal[0]) < 1e-6 * np.ptp(signal), name
@@ -392,7 +399,7 @@ def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
     ("chosen", "sign"), [pytest.param(rigid(8), -1.0, marks=RIGID), pytest.param(rigid(9), 1.0, marks=RIGID)]
 )
 def test_mirror_image_of_a_cycle_is_one(chosen: Stage, sign: float) -> None:
-    """From the mirrored state, sticking on the other side, shooting closes the same orbit without a step."""
+    """From the mirrored state, sticking on the other side, shooting closes the orbit without a step."""
     stages = Ensemble.held(chosen.flat(), 1)
     result = symmetric_cycles(stages) if sign < 0 else asymmetric_cycles(stages, return_map(stages, 1e-6))
     mirrored = close(stages, -result.states, result.orbits.times, sign, CYCLE_RTOL)
@@ -420,7 +427,7 @@ def test_unequal_friction_keeps_a_cycle_off_the_reference() -> None:
 @UNEQUAL
 @pytest.mark.parametrize(("crossover", "share"), [(4, 0.01), (4, 0.05), (8, 0.01)])
 def test_simulation_with_unequal_friction_settles_on_the_cycle(crossover: float, share: float) -> None:
-    """Its turning points long after a release lie as far ahead and behind as those of the cycle."""
+    """Long after a release, its turning points lie as far ahead and behind as those of the cycle."""
     chosen = rigid(crossover, friction__asymmetry=share)
     cycle = only(chosen)
     _, heights = swings(chosen.replace({"motion.displacement": "3 mm", "motion.duration": "250 s"}), rtol=1e-8)
@@ -442,7 +449,7 @@ def test_mirrored_friction_mirrors_the_cycle() -> None:
 @pytest.mark.inner
 @UNEQUAL
 def test_much_unequal_friction_ends_hunting() -> None:
-    """At 8 Hz, where the cycle attracts less, 5 % of difference is too much: simulations come to rest from anywhere."""
+    """At 8 Hz, where the cycle attracts less, 5 % of difference is too much: simulations rest from anywhere."""
     chosen = rigid(8, friction__asymmetry=0.05)
     result = hunting_of(chosen)
     assert result.cycles == ()
@@ -576,8 +583,11 @@ def same_but_for_scale(small: Cycle, large: Cycle, scale: float) -> None:
 @pytest.mark.inner
 @RIGID
 def test_newton_does_not_slide_onto_the_rest_line() -> None:
-    """Every stage rests at its reference, too: what is called a cycle swings by many deflections of the bristles, from
-    2 Hz up to some crossover and nowhere beyond it, and is told why not there."""
+    """Every stage also rests at its reference.
+
+    What is called a cycle swings by many deflections of the bristles, from 2 Hz up to some crossover; beyond it there
+    is a reason instead.
+    """
     crossovers = np.linspace(2, 30, 57)
     flat = rigid(4).flat() | {"controller.crossover": crossovers}
     cycles = find_cycles(Ensemble.held(flat, crossovers.size))
@@ -621,8 +631,10 @@ def test_unusable_tolerances_are_refused(rtol: float) -> None:
 
 @UNEQUAL
 def test_both_cycles_near_a_fold_are_found() -> None:
-    """At an asymmetry of 1.7 % the cycle is about to vanish: of 24 simulated starts 20 swing to 0.786 and -0.274 mm for
-    1500 s, and a cycle that repels lies 2 % beside."""
+    """At an asymmetry of 1.7 % the cycle is about to vanish.
+
+    Of 24 simulated starts 20 swing between 0.786 and -0.274 mm for 1500 s, and an unstable cycle lies 2 % beside.
+    """
     result = hunting(rigid(8, friction__asymmetry=0.017))
     assert result.certain
     assert len(result.cycles) == 2
@@ -633,8 +645,10 @@ def test_both_cycles_near_a_fold_are_found() -> None:
 
 @FREE_RIG
 def test_an_asymmetric_pair_takes_over_beyond_a_supercritical_flip() -> None:
-    """With a joint mode at 30 Hz the free rig at 4.7 Hz has a symmetric cycle that repels and a pair that attracts, and
-    stays there for 400 simulated periods (found by a reviewer); a ramp has no place to hunt about."""
+    """With a joint mode at 30 Hz the free rig at 4.7 Hz has an unstable symmetric cycle and a stable pair.
+
+    It stays there for 400 simulated periods (found by a reviewer); a ramp has no place to hunt about.
+    """
     soft = VARIANTS["free, parasitic"].replace({"parasitic.frequency": "30 Hz", "controller.crossover": "4.7 Hz"})
     pair, symmetric = hunting(soft).cycles
     assert (symmetric.symmetric, symmetric.attracts, pair.symmetric, pair.attracts) == (True, False, False, True)

@@ -93,7 +93,7 @@ def test_leuven_antiresonance_and_resonance() -> None:
 
 @pytest.mark.parametrize(("train", "aside"), [(1, 2), (2, 1)])
 def test_leuven_prediction_of_the_other_realisation(train: int, aside: int) -> None:
-    """No worse than the other realisation's own measured response tells it, and for both encoders."""
+    """The prediction is as good as the one from the other realisation's own measured response, for both encoders."""
     model = leuven_model((train,))
     for output, collocated in ((0, True), (1, False)):
         record = leuven(aside)[output]

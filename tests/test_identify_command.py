@@ -1,4 +1,4 @@
-"""`friso identify` as a user runs it: what it writes, says, predicts and refuses."""
+"""Test `friso identify` as a user runs it: what it writes, says, predicts and refuses."""
 
 from __future__ import annotations
 
@@ -112,8 +112,10 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
 def test_a_stage_file_may_leave_out_what_the_log_tells(
     inputs: tuple[Path, Path], machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Masses, friction and motion; which is handed on, so that these are not said to be given, as what is set is. The
-    caller's tables stay as they are."""
+    """Masses, friction and motion may be missing; this is handed on, so that they do not count as given.
+
+    The caller's tables stay unchanged.
+    """
     taken: list[Any] = []
 
     def instead(sources: object, base: friso.Stage, settings: object, progress: object, made_up: list[str]) -> None:
@@ -188,7 +190,7 @@ def test_a_second_run_needs_no_options_again(
     inputs: tuple[Path, Path], done: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """The mapping beside the log is used: told of a channel that is not there, it is refused by its name."""
+    """The mapping beside the log is used; if it names a missing channel, it is refused by its name."""
     kept = inputs[0].with_name("log.csv.friso.toml")
     assert '"force" = "Force"' in kept.read_text()
     monkeypatch.setattr(method, "identify", _stopped)
@@ -206,7 +208,7 @@ def _stopped(*arguments: Any, **named: Any) -> None:
 def test_one_message_holds_the_command_that_tells_all(
     log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is copied, and the log is read; a run that was refused keeps nothing, neither what was said nor a guess."""
+    """The log is copied and read; a refused run keeps nothing, neither options nor guesses."""
     bare = pd.DataFrame({"t": log.time[:COUNT], "x": log["position"][:COUNT] * 1e3, "u": log["force"][:COUNT]})
     bare.to_csv(tmp_path / "bare.csv", index=False)
     monkeypatch.setattr(method, "identify", _stopped)

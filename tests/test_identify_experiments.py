@@ -48,9 +48,10 @@ LUGRE = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 0.4])
 
 @njit
 def twin(mass, friction, gains, push, reference, dt, fine, places, profile):  # type: ignore[no-untyped-def]
-    """One mass with LuGre friction, times a profile over even places, pushed and drawn by a PD after a reference: RK4.
+    """Simulate one mass with LuGre friction that varies with the position, by Runge-Kutta steps.
 
-    Columns position, velocity, actuator force; `fine` steps per sample.
+    The friction is multiplied by a profile over evenly spaced positions. The mass is pushed, and a PD controller makes
+    it follow a reference. Columns of the result: position, velocity, actuator force; `fine` steps per sample.
     """
     out, last = np.empty((len(push), 3)), len(places) - 1
     static, coulomb, stribeck, stiff, damping, viscous = friction
@@ -86,7 +87,7 @@ FLAT = (np.array([-1e3, 1e3]), np.ones(2))
 
 
 def measured(values: np.ndarray, noise: float, rng: np.random.Generator) -> np.ndarray:
-    """With noise, and in steps of its size."""
+    """Return values with noise, rounded to steps of the noise's size."""
     return np.round((values + noise * rng.standard_normal(len(values))) / noise) * noise
 
 
@@ -152,7 +153,10 @@ def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Sta
 )
 @pytest.mark.parametrize("push", [9.0, -6.0])
 def test_friction_that_holds_a_stage_at_rest_is_no_spring(levels: list[float], push: float) -> None:
-    """At rest a force of the sign of the last motion is left, which follows the place where there are two."""
+    """A controller that has stopped against friction holds a force with the sign of the last motion.
+
+    Where the stage stops at two places alone, this force follows the place as that of a spring would.
+    """
     rng, ramp = np.random.default_rng(3), np.linspace(0, 1, 200)
     pairs = list(pairwise(levels))
     position = np.concatenate([np.r_[a + (b - a) * ramp, np.full(800, b)] for a, b in pairs]) * 1e-3
@@ -277,7 +281,7 @@ def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
 
 
 def test_nine_logs_at_one_force_rate_hold_the_static_friction() -> None:
-    """How far the force rate lowers break-away is the same in each: it does not average out."""
+    """The force rate lowers the break-away force equally in each log, so averaging does not remove the error."""
     static, rng = 3.0, np.random.default_rng(3)
     lowered = break_away(3.0, static, 1.0, 2e5, 5e-3)
     logs = [
@@ -336,7 +340,7 @@ def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage) -> None:
 
 
 def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.Stage, wording: Wording) -> None:
-    """With an offset of the sensor, a direction in which the limiter is touched leaves half of the offset unknown."""
+    """If the limiter is touched in one direction, an offset of the position sensor stays half unknown."""
     free = pulled(rig, 0.7e-3, np.random.default_rng(6))
     touched = pulled(rig, 0.7e-3, np.random.default_rng(7), **{"joint.stroke": "1 mm"})
     both = {role: np.concatenate([values, -touched[role]]) for role, values in free.signals.items()}
@@ -386,8 +390,10 @@ def ramps(
     to: float = 1.06,
     noise: tuple[float, float] = (1e-7, 5e-3),
 ) -> Log:
-    """Ramps to either side in turn, `to` so many times the static friction, each a segment that begins at rest, with
-    noise on position [m] and force [N]."""
+    """Return a log of force ramps to either side in turn, each a segment that begins at rest.
+
+    Each ramp ends at `to` times the static friction. `noise`: on position [m] and force [N].
+    """
     parts, signals = [], {"position": [], "force": []}
     for i, force_rate in enumerate(rates):
         time = np.arange(0, 0.3 + to * friction[0] / force_rate, DT)
@@ -415,8 +421,10 @@ def test_break_away_falls_with_the_rate_as_published() -> None:
 
 
 def test_noise_does_not_raise_the_break_away() -> None:
-    """A maximum over noise reads high, the more the heavier what moves: noise on mass times acceleration. With and
-    without noise the forces are the same, within what is said to be unsure."""
+    """With and without noise the forces of break-away agree within their stated uncertainty.
+
+    The maximum of a noisy signal is too high, and more so the heavier the stage: noise of the acceleration times mass.
+    """
     heavy, rates = np.array([2.0, 1.0, 2e-3, 1e5, 632.0, 0.4]), [1.0, 1.0, 2.0, 2.0, 4.0, 4.0]
     clean, noisy = (
         static_from_ramps(ramps(heavy, rates, 8.0, np.random.default_rng(4), 1.15, noise), 8.0)
@@ -456,7 +464,7 @@ def test_ramps_hold_the_static_friction() -> None:
 
 
 def test_a_mass_that_is_not_told_stays_in_the_interval() -> None:
-    """Of 4 kg on bristles that bend far: where motion begins to be visible, the force has passed static friction."""
+    """For 4 kg on soft bristles the force has passed static friction when motion becomes visible."""
     friction = np.array([4.6, 3.1, 4e-3, 4e5, 550.0, 7.0])
     log = ramps(friction, [3.0] * 4, 4.0, np.random.default_rng(5), 1.15, (5e-8, 1e-2))
     of_mass, of_none = (static_from_ramps(log, mass).static for mass in (4.0, 0.0))
@@ -466,7 +474,7 @@ def test_a_mass_that_is_not_told_stays_in_the_interval() -> None:
 
 
 def test_ramps_from_rest_are_recognised() -> None:
-    """They were taken for moves. One event a log is enough where there are several; two are too few."""
+    """Ramps were taken for moves. One event per log is enough if there are several logs; two in one log are too few."""
     log = ramps(LUGRE, [1.0, 2.0, 1.0, 4.0], 1.0, np.random.default_rng(7))
     assert recognised(log, Path("log.csv"))[0] == "break-away"
     few = ramps(LUGRE, [1.0, 2.0], 1.0, np.random.default_rng(7))
@@ -479,7 +487,7 @@ def test_ramps_from_rest_are_recognised() -> None:
 
 @pytest.mark.parametrize("crossover", ["6 Hz", "8 Hz"])
 def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, crossover: str) -> None:
-    """Of a stage that hunts, long after its move, the integrator takes the force through zero while it sticks."""
+    """Long after the move of a stage that hunts, the integrator takes the force through zero while the stage sticks."""
     changes = {"joint.locked": True, "controller.crossover": crossover, "motion.duration": "40 s"}
     run = friso.simulate(rig.replace(changes), sample_time=DT)
     rng = np.random.default_rng(8)
@@ -553,7 +561,10 @@ def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated(wording
 
 
 def travels(speeds: list[float], profile: tuple[np.ndarray, np.ndarray], rng: np.random.Generator, **other: Any) -> Log:
-    """There and back at each speed over 0.1 m (or `way`), a stiff PD behind it; with a constant force of 0.3 N."""
+    """Return a log of travel there and back at each speed.
+
+    The distance is 0.1 m, or `way`. A stiff PD controller drives the mass, and a constant force of 0.3 N acts on it.
+    """
     way, friction = other.get("way", 0.1), other.get("friction", LUGRE)
     rows = [np.zeros(200)]
     for speed in speeds:
@@ -586,8 +597,10 @@ def test_friction_velocity_map_without_slow_speeds(wording: Wording) -> None:
 
 
 def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
-    """Passes that differ, without noise: the intervals are those of one least squares on Coulomb and viscous
-    friction and bias together."""
+    """The intervals are those of one least-squares fit of Coulomb friction, viscous friction and bias.
+
+    The passes differ, without noise.
+    """
     rng, rows = np.random.default_rng(4), []
     for speed in (0.02, 0.05, 0.1):
         leg = np.linspace(0, 0.1, int(0.1 / speed / DT))
@@ -669,7 +682,7 @@ def test_an_exponent_that_the_forces_refute_is_not_believed(wording: Wording) ->
 
 
 def test_constant_speeds_name_the_force_as_the_stage_file_does() -> None:
-    """What acts on the body, not what the motor has to do against it."""
+    """The named force acts on the body; it is not the one that the motor needs against it."""
     log, truth = at_speeds(1)
     kind = KINDS["constant-speed"]
     result = kind.analyse([log], Prior(), NOTHING_CHOSEN)
@@ -823,7 +836,7 @@ def test_hunting_quicker_than_the_filter_is_seen(swing: float, steady: bool) -> 
 
 
 def test_passes_that_hardly_overlap_are_read_whole() -> None:
-    """What they share is too little to speak for them."""
+    """The common range of the passes is too short to represent them."""
     log = ramps_there_and_back((3e-3, 9e-3, 29e-3), 0.02, 1e-3)
     shift = np.where(log.time > log.time[-1] / 2, 0.017, 0.0)
     signals = {**log.signals, "position": log["position"] + shift, "reference": log["reference"] + shift}
@@ -862,7 +875,7 @@ def test_short_and_still_records_show_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("deviation", [0.1, 1.0, 10.0, 1e6])
 def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float, wording: Wording) -> None:
-    """Its interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and is no overflow."""
+    """The interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and does not overflow."""
     result = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
         "mass", "kg", "fit", lambda p: float(p[0]), positive=True
     )

@@ -1,4 +1,4 @@
-"""From estimates to a stage: how several are combined, which the stage file takes, and how its keys hang together."""
+"""From estimates to a stage: how they are combined, which the stage file takes, and how its keys are related."""
 
 from __future__ import annotations
 
@@ -228,7 +228,7 @@ def test_a_multisine_is_an_excitation(lines: range, seed: int) -> None:
 @pytest.mark.parametrize("acceleration", [0.5, 1.0, 5.0])
 @pytest.mark.parametrize("rest", [0, 100, 250, 400])
 def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
-    """Or it is asked what it is, where it rests for little time and accelerates hard."""
+    """Where the stage rests briefly and accelerates hard, the command asks which kind of experiment it is instead."""
     log = repeated(acceleration, rest, np.random.default_rng(2))
     try:
         kind = recognised(log, Path("log.csv"))[0]

@@ -1,4 +1,4 @@
-"""Logs of moves: known truth from simulated machines, and the EMPS record with what it cannot show."""
+"""Logs of moves: simulated machines whose truth is known, and the EMPS record with what it cannot show."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def small() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def reported() -> list[tuple[float, str]]:
-    """What `quick` reports of its progress: the share of the work that is done, and what is being done."""
+    """Return the list of progress reports of `quick`: share of the work done, and the present task."""
     return []
 
 
 @pytest.fixture(scope="module")
 def quick(reported: list[tuple[float, str]]) -> tuple[dict[str, Any], Log, IdentifiedMoves]:
-    """A machine at 2 ms, its log, and what is found in it; its controller is known."""
+    """Return a machine sampled at 2 ms, its log, and what is identified from it with its known controller."""
     machine = drawn(3, False)
     log = moves(machine)
 
@@ -139,8 +139,11 @@ def test_a_stribeck_curve_of_another_exponent_is_told() -> None:
 
 
 def test_how_a_log_begins_does_not_count_in_the_loop(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
-    """How fast and with what bristles a loop was started is not known: a force of the first 20 ms made a Stribeck
-    velocity of 2.35 mm/s 1.5 mm/s, with an interval that excluded it."""
+    """The initial velocity and bristle deflection of the simulated loop are unknown.
+
+    A force in the first 20 ms turned a Stribeck velocity of 2.35 mm/s into 1.5 mm/s, with an interval that excluded the
+    truth.
+    """
     truth, log, _ = quick
     force = log["force"].copy()
     force[3 : round(0.02 / log.sample_time)] += truth["friction.coulomb"]
@@ -165,7 +168,7 @@ def test_a_better_fit_on_a_profile_takes_the_place_of_the_fit(
 def test_a_loop_that_bounds_less_than_the_log_does_not_take_its_place(
     quick: tuple[dict[str, Any], Log, IdentifiedMoves],
 ) -> None:
-    """Of one that stuck and slipped nothing at all was told, with an infinite variance of all that it had fitted."""
+    """A loop fit of a stage that stuck and slipped had infinite variances, and nothing was reported."""
     best = quick[2].fit
     lost = replace(best, covariance=np.full_like(best.covariance, np.inf))
     assert bounds_as_much(best, lost)
@@ -188,8 +191,11 @@ def test_an_interval_reaches_as_far_up_as_that_of_the_logarithm(
 def test_a_loop_that_leaves_more_than_the_noise_is_fitted_once_more(
     quick: tuple[dict[str, Any], Log, IdentifiedMoves], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Machine 3006 of benchmarks.identify: at 1.9 times the noise the Stribeck velocity came out as 0.4043 mm/s (0.4036
-    to 0.4050), that of the truth is 1.86, to which the stage that follows the log leads."""
+    """The fit of machine 3006 of benchmarks.identify left residuals of 1.9 times the noise.
+
+    It had a Stribeck velocity of 0.4043 mm/s (0.4036 to 0.4050) instead of 1.86 mm/s, which a simulation that follows
+    the log finds.
+    """
     best, noise = quick[2].fit, quick[2].quality.noise
     off = replace(best, residual=1.5 * noise / best.left * best.residual)
     fits = iter([best, off, best])
@@ -395,7 +401,7 @@ def with_force(log: Log, force: np.ndarray) -> Log:
 
 @pytest.mark.parametrize("effect", ["cogging", "friction-by-place", "drifting-delay", "play"])
 def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wording: Wording) -> None:
-    """Of all effects that the model leaves out the right one leads; none does on a sound log."""
+    """The right effect of those that the model leaves out comes first; none is named for a sound log."""
     plain = on_a_coupling(1e4, False)
     fitted, bandwidth = rigid(plain)
     assert fit_case(plain, fitted, bandwidth).leading is None
@@ -438,7 +444,7 @@ def test_an_effect_outside_the_model_is_named_and_allowed_for(effect: str, wordi
 
 
 def test_an_integrated_velocity_shows_a_step_test() -> None:
-    """Its noise adds up in the position: neither the bandwidth, nor a lacking model, nor play is made of that."""
+    """Noise of the velocity adds up in the position, but causes no wrong bandwidth, missing model or backlash."""
     step, force = 1e-3, np.repeat([0.0, 9.0, 0.0, -9.0, 0.0, 7.0, 0.0, -12.0], 1000)
     velocity, speed = np.zeros(len(force)), 0.0
     for k in range(1, len(force)):
@@ -507,7 +513,7 @@ def test_no_delay_is_seen_where_there_is_none() -> None:
 
 
 def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:
-    """That of a controller in continuous time is not, whatever is assumed at first."""
+    """The force of a continuous controller is not held between samples, whatever is assumed at first."""
     machine = drawn(3, False)
     log = moves(machine, bare=True)
     as_held = followed(log, {**machine.flat, "drive.sample_time": log.sample_time}, 1250)
@@ -533,7 +539,10 @@ def test_a_position_is_smoothed_no_more_than_the_fit_bears() -> None:
 
 
 def test_an_interval_holds_what_inputs_that_a_log_allows_as_well_make_of_it() -> None:
-    """One of them is true: half of the distance would be an interval that never holds it."""
+    """An interval reaches as far as the results from all inputs that the log allows equally well.
+
+    One of these inputs is the true one: an interval of half the distance would never contain the truth.
+    """
     moved = [np.array([1.0, 0.0]), np.array([0.0, 3.0])]
     wider = fitting._reaching_over(np.diag([0.25, 0.0]), moved)
     assert COVERAGE * np.sqrt(np.diag(wider)) == pytest.approx([0.5 * COVERAGE + 1.0, 3.0])
@@ -625,7 +634,7 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves,
 
 
 def test_half_of_emps_predicts_the_other(identified: IdentifiedMoves, emps: Log) -> None:
-    """The latter half alone, simulated with what was found, on its own."""
+    """The stage identified from the first half predicts the second half, simulated on its own."""
     latter = cut(emps, slice(len(emps.time) // 2, None))
     errors = simulated_log(identified, latter).errors
     for name, percent in PUBLISHED.items():

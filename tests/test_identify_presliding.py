@@ -91,12 +91,12 @@ def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
 
 
 def test_a_held_joint_gives_way_in_series() -> None:
-    """The position is that of a stage beyond a contact of 2e6 N/m; its own mass acts beside it."""
+    """The measured position is that of a stage behind a contact of 2e6 N/m; the stage's mass acts on the contact."""
     log = shaken()
     beyond, contact = 0.5, 2e6
     force = log["force"]
     position = log["position"]
-    for _ in range(3):  # the acceleration of the stage is that of its own position
+    for _ in range(3):  # the stage's acceleration is that of its own position
         acceleration = np.gradient(np.gradient(position, DT), DT)
         bent = (force + beyond * acceleration) / contact
         position = log["position"] + bent
@@ -159,8 +159,10 @@ def test_sliding_is_not_taken_for_bristles(size: float, wording: Wording) -> Non
 
 @pytest.mark.parametrize("size", [3e-6, 1e-5, 2e-5])
 def test_a_slow_loop_of_another_law_is_no_mass(size: float) -> None:
-    """Springs with sliders bend otherwise than the bristles here, and at one frequency inertia looks like stiffness: a
-    mass of 1.7 kg was told as 761 to 1406 kg."""
+    """A stage on springs and sliders has other loops than the bristles of the model.
+
+    At one frequency inertia looks like stiffness: a mass of 1.7 kg was stated as 761 to 1406 kg.
+    """
     time, rng = np.arange(0, 4, 1e-3), np.random.default_rng(1)
     position = size * np.sin(4 * np.pi * time)
     stiffness, most = np.array([40e3, 30e3, 20e3, 10e3]), STATIC * np.array([0.1, 0.25, 0.35, 0.3])
@@ -185,7 +187,7 @@ def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> No
 
 @pytest.mark.thorough
 def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
-    """On the rig, up to half of static friction: by how much a turn ends beside the one before, over its width."""
+    """On the rig, up to half of static friction: drift between successive loops as a share of their width."""
     stage = locked_stage(friso.load(EXAMPLE)).replace({"rail": None})
     measured = friction_law("lugre").shown(stage.flat())
     drift = {}
@@ -194,7 +196,7 @@ def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
         turns = np.reshape(log.logged["position"], (TURNS, -1))
         assert np.max(np.abs(log.logged["disturbance"])) == pytest.approx(1.5, rel=1e-3)
         drift[machine.flat()["friction.model"]] = abs(turns[-1].mean() - turns[-2].mean()) / np.ptp(turns[-1])
-    assert drift["lugre"] > 2 * drift["gms"]  # the integrator, too, moves a loop
+    assert drift["lugre"] > 2 * drift["gms"]  # the integrator moves the loop, too
 
 
 def test_friction_without_bristles_has_none_to_show(refused: Refused) -> None:
@@ -213,8 +215,11 @@ def test_a_slow_current_loop_is_taken_off() -> None:
 
 
 def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording) -> None:
-    """With the deflection measured it need not be held; without, its stiffness is not taken for the bristles'. Cables
-    pull at the stage, which moves ten times as far as the cart then: there are none here."""
+    """If the deflection is measured, the joint need not be held.
+
+    If not, the stiffness of the joint is not taken for that of the bristles. Cables pull at the stage, which then moves
+    ten times as far as the cart; this rig has none.
+    """
     none = {"cable.stiffness": "0 N/m", "cable.drag": "0 N*s/m"}
     stage = friso.load(EXAMPLE).replace({"drive.relative_noise": "1 nm", **none})
     flat = stage.flat()
@@ -229,8 +234,10 @@ def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording
 
 
 def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
-    """Of white noise, whose covariance is known in closed form; one jackknife of eight blocks scatters, their mean does
-    not."""
+    """With white noise the covariance is known in closed form.
+
+    A single jackknife over eight blocks scatters; the mean of many does not.
+    """
     rng, count = np.random.default_rng(5), 800
     columns = rng.standard_normal((count, 3)) @ np.array([[1, 0.8, 0], [0, 0.6, 0], [0, 0, 1e-5]])
     expected = np.linalg.inv(columns.T @ columns)

@@ -1,4 +1,4 @@
-"""How good an identification is: intervals that cannot be empty, noise, model error, and what is said of a bad log."""
+"""Quality of an identification: intervals that are never empty, noise, model error, and messages on a bad log."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ GOOD = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
 
 
 def key_case(estimates: Sequence[Estimate], flat: dict[str, Any], **seen: Any) -> KeyCase:
-    """Estimates of a log, with what is said of it."""
+    """Return estimates together with a log and its quality, as the checks of an identification take them."""
     size = sum(estimate.determined for estimate in estimates)
     rest: Any = {"log": axis(), "inverse": None, "fit": None, "quality": GOOD, "velocity": np.ones(1)}
     rest |= {"flat": flat, "correlation": np.eye(size)}
@@ -171,7 +171,7 @@ def allowed(
 
 
 def of_little_friction(log: Log) -> str:
-    """What is said of the Coulomb friction of a log."""
+    """Return the message on too little Coulomb friction in a log, or nothing."""
     return "".join(finding.words for finding in little_friction.find(ValueCase(log, inverse_model(log, 5.0))))
 
 
@@ -583,7 +583,7 @@ def test_every_doubt_says_what_it_looks_at_and_what_would_decide_it() -> None:
 
 
 def test_a_doubt_that_is_added_is_asked_in_its_order_and_has_its_consequences() -> None:
-    """One file is all that a further effect takes: here one that refuses the mass, and one that is asked before it."""
+    """A new doubt needs one file: here one that refuses the mass, and one that is asked before it."""
     asked = []
 
     def find(name: str, refuses: dict[str, str]) -> Callable[[KeyCase], Iterator[RaisedDoubt]]:
@@ -636,8 +636,11 @@ def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:
 
 
 def test_a_fit_that_leaves_more_than_those_of_simulated_logs_is_off_by_as_much_more() -> None:
-    """Of a force in digits of half a newton, noise moves a fit further than it moves fits of the machine that came out:
-    a bristle stiffness of 770 to 1220 kN/m for 1610, and nothing that told it."""
+    """A fit with larger residuals than the fits of simulated logs has wider intervals by the same factor.
+
+    With a force in steps of half a newton, a bristle stiffness of 1610 kN/m was given as 770 to 1220 kN/m, without a
+    warning.
+    """
     log = axis(seconds=4.0)
     flat = made_up(log, inverse_model(log, 5.0)).flat()
     problem = tracking(flat, log, log.segments[0], [one for one in _parameters(flat) if one.core], 5.0)
@@ -691,7 +694,7 @@ def test_starts_are_tried_all_over_a_long_record() -> None:
 
 
 def test_rests_do_not_count_where_the_motion_is_not_smoothed() -> None:
-    """A position that stands out of its noise at all frequencies is taken as it is, noise and all."""
+    """A position above its noise at all frequencies is used as it is, including its noise."""
     way = np.repeat([0.0, 0.01, 0.0, 0.02], 1000)
     blurred = way + 2e-8 * np.random.default_rng(3).standard_normal(len(way))
     log = record("steps", DT, position=blurred, force=np.zeros(len(way)))

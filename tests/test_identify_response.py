@@ -1,4 +1,4 @@
-"""Frequency responses from records of known systems, and what is read from them: intervals must hold the truth."""
+"""Frequency responses from records of known systems, and values read from them: intervals must contain the truth."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -579,7 +579,7 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
 
 @pytest.mark.thorough
 def test_one_mass_without_a_joint_is_not_told_as_two() -> None:
-    """Its force is held between samples of 1 ms: a resonance near or above the band explained that, with certainty."""
+    """Force held between samples of 1 ms was explained by a resonance near or above the band, with certainty."""
     frequency, mass = np.geomspace(1.0, 100.0, 150), 10.0
     s = 2j * np.pi * frequency
     held = -np.expm1(-1e-3 * s) / (1e-3 * s)

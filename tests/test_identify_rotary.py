@@ -1,4 +1,4 @@
-"""Logs of an axis that turns: the numbers of a linear one in SI, in kg m^2, N m and rad, told once."""
+"""Logs of a rotary axis: the same SI numbers as of a linear axis, in kg m^2, N m and rad; the axis is stated once."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_log_of_angles_asks_for_the_kind_of_axis_alone(break_away: Path) -> No
 
 
 def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -> None:
-    """Static friction, in every number as that of the linear axis; the option is kept beside the log."""
+    """All numbers of static friction equal those of the linear axis; the option is stored beside the log."""
     options = ("--as", "break-away", "--axis", "rotary", "--out", "answer", "--json")
     answer = friso_inside(break_away, "identify", "turned.csv", *options)
     assert answer.returncode == 0, answer.stderr
@@ -79,7 +79,10 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
 
 @pytest.mark.parametrize(("options", "unit"), [((), "A"), (("--scale", "force=0.08 N/A"), "N")])
 def test_a_break_away_in_amperes_is_answered_in_amperes(break_away: Path, options: tuple[str, ...], unit: str) -> None:
-    """In every text and key, unless the scale to newtons is command; a stage in newtons asks for that."""
+    """All texts and keys are in amperes unless the scale to newtons is given.
+
+    A stage file in newtons asks for the scale.
+    """
     rows = np.genfromtxt(break_away / "linear.csv", delimiter=",", skip_header=1)
     csv(break_away / "amperes.csv", "time [s],position [m],current [A]", *(rows * [1, 1, 12.5]).T)
     command = ("identify", "amperes.csv", "--as", "break-away", "--json", *options)

@@ -48,7 +48,7 @@ def test_a_log_that_says_enough_alone_stays_alone() -> None:
 
 
 def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
-    """What one of them alone shows best are its moves."""
+    """A log with one speed, looked at alone, looks like one of moves."""
     speeds = (0.02, 0.05, 0.1)
 
     def course(*speeds: float) -> Course:
@@ -117,7 +117,7 @@ def test_logs_of_one_speed_each_are_one_curve_of_friction() -> None:
 
 
 def test_logs_that_are_not_alike_are_not_joined() -> None:
-    """At another rate, or of a stage set up differently."""
+    """Logs with another sample time or from another setup of the stage stay apart."""
     whole = ramps(LUGRE, [1.0, 1.0, 1.0], 1.0, np.random.default_rng(3))
     one, two, three = (piece(whole, part, f"{i}") for i, part in enumerate(whole.segments))
     other = replace(three, setup={"joint.stroke": "8 mm"})

@@ -1,4 +1,4 @@
-"""What slow records leave open, and machines drawn from what is left open."""
+"""What slow records leave undetermined, and machines drawn from that range."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ STRIBECK = Estimate.normal("friction.stribeck_velocity", "m/s", 1e-3, 1e-5, "dra
 
 
 def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
-    """Estimates of a log of nothing, with what is said of it."""
+    """Return estimates together with a log of zeros, as the checks of an identification take them."""
     log: Any = record("made up", 1e-3, position=np.zeros(100), force=np.zeros(100))
     rest: Any = {"log": log, "inverse": None, "fit": None, "quality": Quality(0.1, 0.1, 0.1, 0.1, 0.1)}
     rest |= {"flat": FLAT, "velocity": np.zeros(1), "correlation": np.eye(sum(one.determined for one in estimates))}
@@ -39,7 +39,7 @@ def case_of(estimates: tuple[Estimate, ...], **seen: Any) -> KeyCase:
 
 
 def shown(estimates: tuple[Estimate, ...], top: float) -> set[str]:
-    """What is left of estimates of a motion of this highest speed [m/s]."""
+    """Return the names of the estimates that remain for a motion with this highest speed [m/s]."""
     case = case_of(estimates, velocity=np.array([0.0, -top]))
     for finding in slow_motion.find(case):
         case = case.with_answers(finding)
@@ -86,7 +86,7 @@ def test_machines_are_drawn_from_intervals_and_from_what_is_left() -> None:
 
 
 def test_what_nothing_is_known_of_is_drawn_from_all_of_its_range() -> None:
-    """Withdrawn altogether, or from zero on: neither stays as it was fitted."""
+    """A parameter that is withdrawn, or known only to lie above zero, is not drawn near its fitted value."""
     nothing = Estimate.unknown("masses.cart", "kg", "drawn", "withdrawn")
     viscous = Estimate.unknown("friction.viscous", "N*s/m", "drawn", "not bounded", 0.0, 20.0)
     parameters = [
@@ -100,8 +100,11 @@ def test_what_nothing_is_known_of_is_drawn_from_all_of_its_range() -> None:
 
 @pytest.mark.parametrize(("left", "doubted", "failed"), [(0.5, False, False), (1.0, True, False), (15.0, True, True)])
 def test_a_record_that_the_whole_model_alone_describes_is_described(left: float, doubted: bool, failed: bool) -> None:
-    """A force that the inverse model cannot know, as that of a stage that sticks: what counts is what the fit leaves,
-    and a cause is named unless the whole model is clearly better than it."""
+    """A record counts as described if the complete model explains it, even where the inverse model cannot.
+
+    An example is the force of a stage that sticks. What counts are the residuals of the fit, and a cause is named
+    unless the complete model is clearly better than the inverse model.
+    """
     time = np.arange(8000) * 1e-3
     position = 0.05 * np.sin(2 * np.pi * 0.5 * time)
     force = 11.0 * np.sign(np.cos(2 * np.pi * 0.5 * time)) + 20.0 * np.sin(2 * np.pi * 3.1 * time)

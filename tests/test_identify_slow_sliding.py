@@ -100,7 +100,7 @@ def test_doubt_about_viscous_friction_and_delay_is_in_the_intervals() -> None:
 
 
 def test_a_stage_with_a_mode_is_what_its_two_masses_do() -> None:
-    """Against the steady vibration of two masses on a spring, whose frequency is that of both against each other."""
+    """The reference is the steady vibration of two masses on a spring at the frequency of the free pair."""
     stage = friso.load(EXAMPLE)
     flat = stage.flat()
     part, whole, time = flat["parasitic.mass"], flat["masses.stage"], np.arange(0, 2.0, 1e-4)

@@ -1,4 +1,4 @@
-"""Logs of standstill and of hunting: what is read of logs that are made up, and of a simulated rig."""
+"""Logs of standstill and of hunting: what is identified from invented logs and from a simulated rig."""
 
 from pathlib import Path
 

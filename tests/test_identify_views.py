@@ -1,4 +1,4 @@
-"""What `friso identify` says, writes and draws, on results made up here: looking at them needs no engine and no fit."""
+"""What `friso identify` says, writes and draws, on invented results: no engine and no fit is needed."""
 
 from __future__ import annotations
 
@@ -184,7 +184,10 @@ def break_away() -> tuple[Any, Log]:
 
 
 def constant() -> tuple[Any, Log]:
-    """There and back over 20 mm at several speeds, with friction that falls and then rises with the speed."""
+    """Return a result and its log of travel over 20 mm at several speeds.
+
+    The friction falls and then rises with the speed.
+    """
     legs = [np.zeros(200)]
     for speed in (0.002, 0.004, 0.008, 0.016, 0.032, 0.064):
         leg = np.linspace(0, 0.02, int(0.02 / speed / DT))
@@ -345,7 +348,7 @@ def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
 
 
 def test_the_headline_says_what_is_identified_and_why_the_rest_is_not(case: tuple, snapshots: Snapshots) -> None:
-    """Of ways to show what is lost only those are named that no log was taken in."""
+    """Only experiments that have no log yet are named as ways to determine what is missing."""
     shown, response, volts, lost = (sentence for _, sentence in headline(case[0]))
     moves_alone = replace(case[0], experiments=tuple(one for one in case[0].experiments if one.kind == "moves"))
     ways = headline(moves_alone)[-1][1]

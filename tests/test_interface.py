@@ -53,7 +53,7 @@ def test_a_command_has_a_function_and_its_options_are_keywords(command: str) -> 
 
 
 def test_dir_is_the_public_list() -> None:
-    """With the functions of installed packages: those of the thesis."""
+    """`dir` includes the functions of installed packages, here those of the thesis."""
     assert dir(friso) == sorted([*friso.__all__, "guideline", "reproduce"])
     assert [name for name in dir(friso) if inspect.ismodule(getattr(friso, name))] == []
 
@@ -200,7 +200,7 @@ def test_units_of_keys(key: str, unit: str) -> None:
 
 
 def test_the_schema_takes_the_examples_and_has_every_key() -> None:
-    """Checked against the tables themselves: every key with what it takes."""
+    """The schema is compared with the tables themselves: every key and the values it takes."""
     document = friso.schema()
     from friso.stage.stage import Stage
 

@@ -81,7 +81,7 @@ import friso.platform.interrupts
 
 
 def test_a_command_that_is_done_is_not_ended_by_a_signal() -> None:
-    """As it would be once Python has taken its handlers away."""
+    """Without protection it would be, once Python has removed its signal handlers at exit."""
     done = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True)
     assert done.stdout == "True\n", done.stderr
 
@@ -194,8 +194,10 @@ with interrupts.raising():
     "way", ["import endless", "pbkdf2_hmac('sha256', b'', b'', 2 * 10**9)", "swallow()", "write()"]
 )
 def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str) -> None:
-    """In an import that does not return, in a library that hears nothing, in code that swallows the exception; what
-    must be whole becomes so first."""
+    """A command stuck in an import, in a library or in code that swallows the exception is ended.
+
+    A file that must be written completely is finished first.
+    """
     program = [sys.executable, "-c", STUCK.replace("WAY", way)]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
     assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "friso: terminated\n")
@@ -206,13 +208,13 @@ def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str)
     "closed", ["os.close(2)", "end, full = os.pipe(); os.dup2(full, 2); os.write(2, bytes(2**16))"]
 )
 def test_a_command_whose_last_word_nobody_takes_is_ended(tmp_path: Path, closed: str) -> None:
-    """On a terminal that is gone, and into a pipe that is full."""
+    """The command writes to a terminal that is closed, or into a pipe that is full."""
     program = [sys.executable, "-c", STUCK.replace("    WAY", f"    {closed}; swallow()")]
     assert subprocess.run(program, cwd=tmp_path, timeout=50).returncode == 128 + signal.SIGTERM
 
 
 def test_a_signal_that_is_ignored_is_so_where_others_wait() -> None:
-    """As friso under nohup ignores a closed terminal."""
+    """friso under nohup ignores the closing of its terminal in the same way."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with interrupts.hold_interrupts():
@@ -254,7 +256,7 @@ def test_ctrl_c_that_the_main_thread_does_not_take_waits() -> None:
 
 
 class Going:
-    """Is struck by Ctrl-C while it goes, where Python ignores what is raised."""
+    """An object that raises SIGINT in its destructor, where Python ignores exceptions."""
 
     def __del__(self) -> None:
         signal.raise_signal(signal.SIGINT)
@@ -269,7 +271,7 @@ def test_ctrl_c_while_an_object_goes_is_not_lost(capsys: pytest.CaptureFixture[s
 
 
 class Cut:
-    """Its finalizer stumbles over what an interrupt has cut short."""
+    """An object whose finalizer fails on what an interrupt has left undone."""
 
     def __del__(self) -> None:
         raise ValueError("created in a different Context")
@@ -312,7 +314,7 @@ class Builder:
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be built, with a lock of its own."""
+    """A file to be built, with a lock of its own."""
 
     file: Path
     title: str = "a kernel"
@@ -373,7 +375,7 @@ def test_what_is_compiled_when_its_question_is_overtaken_is_there_for_the_next(
 
 
 def test_who_fails_leaves_what_another_waits_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And what nobody waits for any more is not begun."""
+    """A request that nobody waits for any more is not begun."""
     shared, failing, unwanted = requests(tmp_path, 3)
     begun, may_end = [], {shared: Event(), failing: Event()}
 
@@ -423,7 +425,7 @@ def test_who_waits_for_another_that_compiles_can_be_interrupted(
 
 @pytest.mark.parametrize("signals", [[signal.SIGHUP], [signal.SIGINT, signal.SIGINT]])
 def test_the_app_ends_in_one_line(signals: list[signal.Signals]) -> None:
-    """Also for a terminal that is closed, and for an impatient user."""
+    """The app also does so if the terminal is closed, and if an impatient user presses Ctrl-C again."""
     command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -43,7 +43,7 @@ def values(log: Log, bandwidth: float | None = 10.0, by_direction: bool = False)
 @settings(max_examples=20)
 @given(SIZES, SIZES, SIZES, st.floats(-1.0, 1.0))
 def test_without_noise_all_is_found(mass: float, viscous: float, coulomb: float, offset: float) -> None:
-    """But for the filters, which smear the turning points."""
+    """Errors come only from the filters, which smear the turning points."""
     numbers = values(swinging(mass, viscous, coulomb, offset))
     scale = mass + viscous + coulomb  # of accelerations and speeds of about 1
     for name, truth in zip(numbers, (mass, viscous, coulomb, offset), strict=True):
@@ -95,7 +95,7 @@ def test_directions_are_told_apart() -> None:
 
 
 def test_a_long_rest_says_nothing_of_friction() -> None:
-    """At rest the sign of a noisy velocity is noise, and the force whatever the controller holds."""
+    """At rest the sign of a noisy velocity is random, and the force is what the controller happens to hold."""
     rng, log = np.random.default_rng(3), swinging(2.0, 1.0, 4.0, 0.5)
     rest = 20_000
     position = np.concatenate([log["position"], np.full(rest, log["position"][-1])])
@@ -118,7 +118,7 @@ def test_slow_hunting_does_not_hide_the_bandwidth(slow: float) -> None:
 
 @pytest.mark.parametrize(("share", "expected"), [(0.045, 2.0), (0.055, 10.0)])
 def test_the_bandwidth_holds_95_percent_of_the_accelerations_power(share: float, expected: float) -> None:
-    """Two sines, the faster with this share of the power of the acceleration, far less of that of the position."""
+    """The faster of two sines has this share of the acceleration's power, and far less of that of the position."""
     time, slow, fast = np.arange(40_000) * DT, 2.0, 10.0
     powers = np.array([1 - share, share])
     amplitudes = np.sqrt(powers) / (2 * np.pi * np.array([slow, fast])) ** 2
@@ -144,7 +144,7 @@ def test_intervals_hold_the_truth() -> None:
 
 
 def test_the_cart_of_a_joint_has_the_friction() -> None:
-    """A stage of 0.6 kg that swings on its cart of 1.4 kg; friction is the cart's."""
+    """A stage of 0.6 kg swings on its cart of 1.4 kg; the friction acts on the cart."""
     log = swinging(2.0, 1.0, 4.0, 0.5)
     swing = 1e-3 * np.sin(2 * np.pi * 3 * log.time)
     force = log["force"] + 0.6 * np.gradient(np.gradient(swing, DT), DT)

@@ -1,4 +1,4 @@
-"""From one friction law to another: what is kept, and what is said not to be."""
+"""Conversion from one friction law to another: what is kept, and what is reported as lost."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -44,8 +44,11 @@ STICKING = [lugre(2), DAHL, elasto_plastic(), elasto_plastic(deflection="2 um"),
 
 
 def slopes(flat: Mapping[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any], int]:
-    """Of the law as it is declared, pulled slowly forward: how its states change with the displacement, its force, both
-    as functions of the states, and how many these are. An element that slips is where it began to."""
+    """Return the law's slopes, its force and its number of states, for a slow forward pull.
+
+    The slopes are the derivatives of the states with respect to displacement; both they and the force are functions of
+    the states. An element that slips is at the deflection at which it began to slip.
+    """
     law, velocity = friction_law(flat["friction.model"]), state("velocity")
     friction = law.declare(velocity, law.variant(flat))
     states = [item.symbol for item in friction.component.states]
@@ -206,8 +209,11 @@ def test_points_of_a_power_law_give_its_exponent(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("noise", "blur"), [(0.003, 0.0), (0.01, 0.0), (0.003, 0.4)])
 def test_scatter_does_not_stiffen_the_start(tmp_path: Path, noise: float, blur: float) -> None:
-    """Of the force, or of the displacement [um]: the first slope within 7 %; LuGre, whose curve it is, keeps
-    points that scatter in force alone, but not those of a curve that no springs have."""
+    """Noise of the force, or of the displacement [um], changes the first slope by at most 7 %.
+
+    LuGre, whose curve it is, keeps points with noise of the force alone, but not those of a curve that no set of
+    springs has.
+    """
     way, rng = np.linspace(0.0, 300.0, 3001), np.random.default_rng(0)
     scatter, seen = 3 * noise * rng.standard_normal(len(way)), way + blur * rng.standard_normal(len(way))
     conversion = convert(LUGRE, "lugre", virgin=curve_file(tmp_path, seen, -3 * np.expm1(-way / 40) + scatter))
@@ -221,8 +227,10 @@ def test_scatter_does_not_stiffen_the_start(tmp_path: Path, noise: float, blur: 
 
 
 def test_the_range_of_the_stiffness_holds_the_truth() -> None:
-    """Of curves drawn at random: few points or many, even or closer near rest; and of one whose displacement 0 is not
-    where the force begins."""
+    """Curves are drawn at random, and one has displacement 0 where the force is not yet 0.
+
+    They have few points or many, evenly spaced or denser near rest.
+    """
     rng, shown = np.random.default_rng(11), measure_friction(LUGRE.flat())
     shapes = [lambda w: -np.expm1(-w), lambda w: w / (1 + w), lambda w: np.minimum(w, 1.0), np.tanh]
     held = []
@@ -242,8 +250,10 @@ def test_the_range_of_the_stiffness_holds_the_truth() -> None:
 
 
 def test_points_leave_what_they_do_not_show_to_the_stage(tmp_path: Path) -> None:
-    """The lag of Maxwell-slip elements is that of the stage. Points that level off a little lower than static friction
-    are not followed by springs that are hardly stiff."""
+    """The lag of the Maxwell-slip elements stays that of the stage.
+
+    Points that level off slightly below static friction do not lead to springs with hardly any stiffness.
+    """
     stage = under(gms())
     levels_off = 0.99 * POINTS_N
     levels_off[-2:] = 2.96, 2.96 + 1e-6
@@ -300,7 +310,7 @@ def test_its_figure_can_be_drawn() -> None:
 
 @pytest.mark.parametrize("friction", [*STICKING, stribeck(2)])
 def test_a_law_converted_to_itself_stays_as_it_is(friction: str) -> None:
-    """But for another number of elements, which lag as those did."""
+    """Only the number of elements may differ; the new elements lag as the old ones."""
     stage = under(friction)
     law = stage.flat()["friction.model"]
     conversion = convert(stage, law, 3)

@@ -26,7 +26,7 @@ PD = stage(release(), friction=lugre(2), controller=gains(kp=1000, kd=20, tau=1e
 def case(
     verdict: str, edge: float | None = None, certain: bool = True, edge_certain: bool = True, given_up: Any = ()
 ) -> Any:
-    """As much of a case as the verdicts across laws look at."""
+    """Return an invented case with what the verdicts across laws read."""
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
     margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=1e-5)
@@ -36,7 +36,7 @@ def case(
 
 
 def under(law: str, *verdicts: Any) -> LawVerdict:
-    """A law with a trial for each verdict, its edge [Hz] and what else is told of it (see `case`)."""
+    """Return an invented law verdict with a trial for each verdict, edge [Hz] and further values (see `case`)."""
     conversion = convert(RIGID, law)
     keys = list(conversion.open)
     trials = [
@@ -62,7 +62,10 @@ def test_one_verdict_under_all_laws(wording: Wording) -> None:
 
 
 def test_laws_that_disagree(wording: Wording) -> None:
-    """What tells the fewer from the others decides; nothing tells LuGre's from all others."""
+    """The measurement that separates the fewer laws from the others is named.
+
+    No measurement separates LuGre from all others.
+    """
     alone = across(under("lugre", ("hunts", 9.7)), under("elasto_plastic", ("settles", 9.1)))
     assert alone.deciding("given") == [friction_law("elasto_plastic").decided_by[""]]
     laws = across(
@@ -127,7 +130,7 @@ def test_no_law_is_certain(wording: Wording) -> None:
 
 
 def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> None:
-    """Measuring what is open in it may leave the values with which it is not certain out."""
+    """Measuring an open parameter may exclude the values with which the law is uncertain."""
     laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0), ("settles", 7.1, False)))
     assert laws.hunts("given") is None
     assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
@@ -135,7 +138,7 @@ def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> No
 
 
 def test_no_law_that_gives_one_answer(wording: Wording) -> None:
-    """Nothing is said of the stage before the first law; values that differ look different."""
+    """The text says nothing of the stage before the first law; values that differ are printed differently."""
     gms = under("gms", ("hunts", 9.1), ("settles", 7.0))
     (key,), trials = gms.conversion.open, gms.trials
     close = tuple(replace(trial, drawn={key: value}) for trial, value in zip(trials, (1.0, 1.0004), strict=True))
@@ -178,7 +181,10 @@ def test_an_edge_that_is_known_up_to_a_share_is_a_range() -> None:
 
 
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
-    """What a law leaves open follows the friction: bristles that hold 1 N elastically would be too much for 0.15 N."""
+    """A law's open parameters are adapted to each machine's friction.
+
+    Bristles that hold 1 N elastically would be too strong for 0.15 N.
+    """
     machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))]
     frictions = frictions_that_keep(machines).frictions
     assert {name.split(",")[0] for name in frictions} == {"elasto_plastic", "gms", "rolling"}

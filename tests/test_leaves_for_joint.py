@@ -140,7 +140,7 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
 
 
 def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advice) -> None:
-    """That of the joint as it is, as a number; not that of leaf springs, which are in the file."""
+    """The mode of the present joint is named if the file states it as a number, not if the file has leaf springs."""
 
     def replaced(present: Stage) -> bool:
         sentences = " ".join(answer(replace(tuning, stage=present)))
@@ -170,7 +170,7 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
 
 
 def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It stands first in the answer, and is searched otherwise than what it was found from."""
+    """The least change comes first in the answer, and its search differs from that of its parent remedy."""
     (isolator, _), tried = tuning.outcomes, []
     monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
     monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))

@@ -20,7 +20,10 @@ LOCK = "lock"
 def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
     locked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By another process, to which it is a leftover until then. filelock makes it again, for others to read."""
+    """Another process may remove a folder that looks like a leftover until it is locked.
+
+    filelock then creates it again, readable by others.
+    """
     real, folders = FileLock.acquire, []
 
     def acquire(lock: FileLock, *arguments: Any, **named: Any) -> Any:
@@ -47,7 +50,7 @@ def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
 
 @posix
 def test_what_another_user_left_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Root's, too: nor is anything made in it, such as a lock."""
+    """A leftover of root stays as well. Nothing, such as a lock, is created in such a folder."""
     left = tmp_path / "a-left"
     left.mkdir(mode=0o700)
     with monkeypatch.context() as patch:
@@ -55,12 +58,12 @@ def test_what_another_user_left_stays(tmp_path: Path, monkeypatch: pytest.Monkey
         assert not is_leftover(left, LOCK)
         remove_leftovers(tmp_path, "a-", LOCK)
         assert ([*tmp_path.iterdir()], [*left.iterdir()]) == ([left], [])
-    with locked_folder(tmp_path, "a-", LOCK) as folder:  # those of this user go with the next
+    with locked_folder(tmp_path, "a-", LOCK) as folder:  # a leftover of this user is removed by the next call
         assert [*tmp_path.iterdir()] == [folder]
 
 
 def test_a_lock_decides_what_is_left_over(tmp_path: Path) -> None:
-    """At whatever age: a process that has not locked its folder yet makes another."""
+    """The age of a folder does not matter: a process that has not locked its folder yet creates another one."""
     for name in ("a-young", "a-old", "b-other"):
         (tmp_path / name).mkdir(mode=0o700)
     os.utime(tmp_path / "a-old", (0, 0))

@@ -1,4 +1,4 @@
-"""`friso logs` as a user runs it: what it shows of files of any kind, and that it identifies nothing."""
+"""`friso logs` as a user runs it: what it shows of files of any kind, without identifying anything."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_the_command(bare: Path, tmp_path: Path) -> None:
 def test_one_bad_file_does_not_hide_the_others(
     bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, full: bool
 ) -> None:
-    """Nor is it hidden where the disk is full."""
+    """The other files are also shown if the disk is full."""
 
     def no_space(*_: object) -> list[Path]:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -156,7 +156,10 @@ def test_the_command_says_what_was_said(tmp_path: Path) -> None:
 
 
 def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
-    """No reference for a force, no rpm for a position, no counter for a clock, and no made-up sample time."""
+    """A reference is not suggested as a force, rpm not as a position, a counter not as a clock.
+
+    No sample time is invented.
+    """
     noise = 1e-6 * np.random.default_rng(1).standard_normal(M["time"].size)
     count = np.arange(M["time"].size)
     plain = [M["position"], M["position"] + noise, M["force"]]

@@ -1,4 +1,4 @@
-"""Readers of logs: each format gives back what was written, and tells how it read it."""
+"""Readers of logs: each format returns what was written and reports how it was read."""
 
 import itertools
 import os
@@ -118,7 +118,7 @@ ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], s
     ],
 )
 def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
-    """Delimiters at the ends of some rows, DOS's end of file, and what is told above the table or within names."""
+    """Rows end in delimiters, the file ends in DOS's mark, and text stands above the table or within names."""
     path = tmp_path / "a.csv"
     path.write_bytes(text.encode())
     position, force = read_table(path).channels[-2:]
@@ -425,7 +425,7 @@ def test_uff_time_histories(tmp_path: Path) -> None:
 
 
 def test_units_of_a_universal_file(tmp_path: Path) -> None:
-    """From the label, else from the kind of data and the units of the file; times in the unit of their axis."""
+    """Units come from the label, else from the data type and the file's units; times have their axis's unit."""
     path = log_files.write_uff(tmp_path / "a.uff", M["time"], {"position": ("", M["position"])})
     assert channel(read_table(path), "position").unit == ""
     pyuff = pytest.importorskip("pyuff")
@@ -439,7 +439,7 @@ def test_units_of_a_universal_file(tmp_path: Path) -> None:
 
 
 def test_units_of_lvm_stand_above_their_columns(tmp_path: Path) -> None:
-    """Also with a column of times per channel, and where a channel has none."""
+    """Units are also read with a time column per channel, and where a channel has no unit."""
     columns = list(zip(M["time"], M["position"], M["time"], M["force"], strict=True))
     head = [
         "LabVIEW Measurement\t",
@@ -468,7 +468,8 @@ def test_lvm(tmp_path: Path) -> None:
     assert channel(table, "position").values == pytest.approx(M["position"] * 1e3, abs=1e-8)
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
     assert channel(table, "force").unit == "N"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]  # the library leaves a cache unless told not to
+    # the library would leave a cache file unless told not to
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
     with pytest.raises(LogError, match="without numbers"):
         read_table(
             log_files.write_lvm(tmp_path / "b.lvm", {name: (unit, x[:0]) for name, (unit, x) in SIGNALS.items()})
@@ -713,7 +714,7 @@ runpy.run_path({program!r}, run_name="__main__")
 
 
 def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a processor spends on it counts, and only what takes very much longer is given up."""
+    """The limit counts processor time; a file is given up only if it takes far longer."""
     slow = tmp_path / "slow.py"
     slow.write_text(SLOW.format(program=confined.binary.__file__))
     monkeypatch.setattr(confined.binary, "__file__", str(slow))
@@ -727,7 +728,7 @@ def test_a_file_is_given_the_time_that_a_busy_machine_takes(tmp_path: Path, monk
 
 
 def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused: Refused) -> None:
-    """By a signal: its reader calls itself for each level."""
+    """The library's reader recurses once per level and dies by a signal."""
     log_files.cells_in_cells_as_mat(tmp_path / "a.mat", 200_000)
     assert (tmp_path / "a.mat").stat().st_size < 30_000
     with refused("log"):

@@ -1,4 +1,4 @@
-"""Roles of channels by mechanics: what is a force, a position, a velocity, a reference, a clock and a counter."""
+"""Roles of channels by mechanics: how a force, position, velocity, reference, clock and counter are recognised."""
 
 from pathlib import Path
 
@@ -107,7 +107,7 @@ def test_no_role_follows_from_the_place_of_a_column(order: tuple[int, ...], tmp_
 
 
 def test_rpm_and_amperes(tmp_path: Path) -> None:
-    """A speed that was wanted is no position, and all that is open is told at once."""
+    """A reference speed is not taken for a position, and all open questions are asked at once."""
     log = steps()
     wanted = np.repeat(np.array(LEVELS) / 25, 600) * 600
     columns = [log["time"], wanted, 300 * log["velocity"], log["force"] / 35]

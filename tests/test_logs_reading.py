@@ -1,4 +1,4 @@
-"""From a file to a log: roles, units, scales, one time base, and what is refused or told."""
+"""From a file to a log: roles, units, scales, one time base, and which files are refused or commented on."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -49,7 +49,7 @@ def test_where_a_force_limit_unsettles_a_loop(share: float, always: str) -> None
 
 @pytest.mark.inner
 def test_many_loops_are_looked_at_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All at once took 0.1 MB each, 1 GB for a map of 100 by 100."""
+    """All loops at once took 0.1 MB each, hence 1 GB for a map of 100 by 100 cells."""
     flat, shares, held = VARIANTS["rigid, Stribeck 2, PI, limit"].flat(), np.array([0.9, 1.1, 0.9, 1.1, 1.1]), []
     mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
     gains = shares * flat["friction.viscous"] * flat["controller.kp"] / mass
@@ -86,7 +86,10 @@ def test_van_dijks_rules_need_their_gain_where_hardly_anything_is_viscous() -> N
 
 
 def test_a_stage_without_friction_is_judged_too() -> None:
-    """No friction deflects its loop, from which magnitudes follow elsewhere; a PI controller alone never damps it."""
+    """Without friction nothing sets the size of its motion, which follows from friction otherwise.
+
+    A PI controller alone never damps the stage.
+    """
     assert unstable(VARIANTS["rigid, no friction section"]) == ()
     pushed = VARIANTS["rigid stage, PI"].as_written()
     smooth = Stage(**{name: table for name, table in pushed.items() if name != "friction"})

@@ -39,7 +39,7 @@ def friso(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
-    """A folder with a map, and what its command printed."""
+    """Return a folder with a map, and the document that its command printed."""
     folder = tmp_path_factory.mktemp("map")
     done = friso_inside(
         folder, "map", RIG, *SMALL, "--out", "a.zarr", "--export", "a.csv", "--export", "a.nc", "--json"
@@ -268,7 +268,7 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
-    """Nor is one replaced that a user puts beside a store that was filled from Python."""
+    """A file that a user puts beside a store filled from Python is not replaced either."""
     small = {"joint.stroke": "0.2 mm, 1 mm"}
     friso_api.sweep(RIG, small, out=tmp_path / "a.zarr")
     (tmp_path / "a.html").write_text("precious")

@@ -450,7 +450,7 @@ def unpacked(text: str, kind: str) -> np.ndarray:
 
 
 def where(runs: xr.Dataset) -> list[float | None]:
-    """Where the machine stands on the axes of a page."""
+    """Return the machine's coordinates on the axes of a page."""
     return [axis["machine"] for axis in page_data(map_html(runs, "peaks", RERUN))["axes"]]
 
 
@@ -529,7 +529,7 @@ def test_the_page_opens_offline_and_says_what_it_shows():
 def test_a_map_is_laid_out_once_for_its_page_and_its_files(
     printed: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """On the page its note is a text beside it, and is cut off the figure."""
+    """On the page its note is a text beside the figure, and is left out of the figure."""
     drawn: list[Figure] = []
     render = matplotlib_renderer.render
     monkeypatch.setattr(matplotlib_renderer, "render", lambda figure: drawn.append(figure) or render(figure))
@@ -631,7 +631,7 @@ def test_arrays_of_different_shape_are_refused():
 
 
 def swinging(where: np.ndarray) -> xr.Dataset:
-    """The plain map, 4 crossovers by 5 strokes, whose runs swing where told and rest elsewhere."""
+    """Return the plain map, 4 crossovers by 5 strokes, whose runs swing where `where` is true and rest elsewhere."""
     runs = plain()
     runs["outcome"] = (runs.outcome.dims, np.where(where, "swings", "rests"))
     runs["peaks"] = (runs.peaks.dims, np.where(where, 2.0, 0.0))
@@ -666,7 +666,7 @@ def test_a_map_says_first_where_runs_swing(
 
 
 def test_where_runs_swing_holds_for_every_cell() -> None:
-    """Of any map: no cell outside of the ranges told swings, and so many of those inside do."""
+    """On any map, no cell outside the stated ranges swings, and the stated share of those inside does."""
     rng = np.random.default_rng(2)
     where = rng.random((4, 5)) < 0.4
     where[3], where[:, 4] = False, False

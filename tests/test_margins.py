@@ -54,7 +54,7 @@ def test_a_margin_ends_where_a_search_from_many_starts_says_so(locked: Stage) ->
 
 
 def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> None:
-    """At half its static friction the locked rig settles, and hunts with a little more: all in the first lines."""
+    """At half its static friction the locked rig settles; with a little more it hunts. The first lines say so."""
     case = check(rig.replace({"friction.static": "1.4 N", "joint.locked": True}))["locked"]
     margin = case.static_friction
     assert margin is not None
@@ -68,7 +68,7 @@ def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> Non
 
 
 def test_static_friction_alone_is_scaled_or_all_of_it() -> None:
-    """Twice all friction leaves every deflection and speed of a law as it is."""
+    """Doubling all friction leaves every deflection and speed of a law unchanged."""
     for name in ("rigid", "two frictions") if "two frictions" in VARIANTS else ("rigid",):
         flat = VARIANTS[name].flat()
         twice = with_friction(flat, 2.0)
@@ -88,7 +88,7 @@ def test_the_joint_has_margins_where_it_is_free(rig: Stage) -> None:
 
 
 def test_the_document_holds_the_margins_of_the_joint_where_details_are_wanted(rig: Stage) -> None:
-    """As multiples of the keys of the stage file and as values, in the units of its axis."""
+    """Margins are given as multiples of the stage file's keys and as values in the units of its axis."""
     begins = ParameterMargin(False, MarginEnd(0.8, 0.75, True), None, (1 / 3, 3.0), (1,))
     margins = {"joint.stroke": begins, "joint.stiffness": replace(begins, below=None)}
     document = joint_margins_document(rig, margins)["joint_margins"]
@@ -115,7 +115,7 @@ def made_up_case(margin: ParameterMargin, judgement: Any) -> Any:
 
 
 def test_a_margin_is_told_with_both_of_its_ends() -> None:
-    """Hunting begins, or ends, within the range that is told; one end alone was up to a tenth off."""
+    """Hunting begins or ends within the stated range; stating one end alone was wrong by up to a tenth."""
     begins = ParameterMargin(False, None, MarginEnd(1.3149, 1.4, True), (1 / 3, 3.0))
     assert "between 1.31 and 1.4 times" in margin_sentence("static friction", begins)
     ends = ParameterMargin(True, MarginEnd(0.5, 0.4449, True), MarginEnd(1.3, 1.4411, True), (1 / 3, 3.0))
@@ -143,8 +143,10 @@ def test_a_side_that_was_given_up_is_no_margin() -> None:
 
 @pytest.mark.inner
 def test_a_window_that_was_searched_is_not_forgotten() -> None:
-    """Something attracts from 0.8 to 0.9 times a parameter alone: that is the nearest end below, not what lies beyond.
-    A rough survey that is wrong next to the stage's own value only moves the end farther off."""
+    """A limit cycle exists only from 0.8 to 0.9 times a parameter: the nearest end below is in that window.
+
+    A rough survey that is wrong next to the stage's own value only moves the end farther away.
+    """
     calls: list[np.ndarray] = []
 
     def answers(stages: Any) -> Any:

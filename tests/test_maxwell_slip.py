@@ -80,7 +80,10 @@ def path(result: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def closures(displacement: np.ndarray) -> int:
-    """How many inner loops a path closes, by its turning points: a way past where the way before the last began."""
+    """Return how many inner loops a path closes, from its turning points.
+
+    A loop closes where the path passes the turning point at which the previous stroke began.
+    """
     turns = displacement[np.concatenate([[True], np.diff(np.sign(np.diff(displacement))) != 0, [True]])]
     stack: list[float] = []
     closed = 0
@@ -93,8 +96,10 @@ def closures(displacement: np.ndarray) -> int:
 
 
 def test_force_over_displacement_remembers_every_turn() -> None:
-    """On a path with loops within loops, every element's deflection is that of the reference, to rounding: inner loops
-    close, and are forgotten once they have."""
+    """Every element's deflection is that of the reference to rounding, on a path with loops within loops.
+
+    Inner loops close, and are then forgotten.
+    """
     result = friso.simulate(HELD, 1e-10, 2e-5)
     positions, sampled = path(result)
     turns = result.turning_deviation.values
@@ -111,7 +116,7 @@ def test_force_over_displacement_remembers_every_turn() -> None:
 
 
 def test_masing_s_rule() -> None:
-    """From a turn with everything slipping, the force follows the virgin curve at twice its size."""
+    """After a reversal with all elements slipping, the force follows the virgin curve at twice its size."""
     result = friso.simulate(SLIDES, 1e-10, 2e-6)
     (first, second), positions = result.turning_time.values[:2], result.position.values
     total = result.friction_force.values
@@ -210,7 +215,7 @@ def test_deviations_through_switches_against_differences(duration: float) -> Non
 
 
 def test_small_motions_of_a_stage_that_sticks() -> None:
-    """It hangs on all elements, that stick; one that slides on none."""
+    """A sticking stage is held by all sticking elements; a sliding one is held by none."""
     flat = MOVES.flat()
     stuck, sliding = plant(flat, member()), plant(flat, member(1e-3))
     assert stuck.states == sliding.states == ("position", "velocity")
@@ -230,7 +235,10 @@ def test_small_motions_of_a_stage_that_sticks() -> None:
 
 
 def test_describing_function_of_elements() -> None:
-    """Of each: k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
+    """Each element contributes k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A).
+
+    Here cos(theta) = 1 - 2 L/A; below its limit L the element contributes k.
+    """
     amplitudes, frequency = np.array([2e-6, 1e-5, 1.3e-5, 3e-5, 1e-3]), 3.0
     responses = describing(MOVES, amplitudes, [frequency])
     assert set(np.ravel(responses.status)) == {"done"}

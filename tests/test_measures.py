@@ -41,7 +41,7 @@ def test_of_close_peaks_the_tallest_stays() -> None:
 
 
 def test_what_counts_at_the_edge() -> None:
-    """At 10 s and 0.5 s apart peaks count, at 0.1 mm they do not; of equal ones too close the first stays."""
+    """Peaks at 10 s and 0.5 s apart count, those of 0.1 mm do not; of equal peaks too close the first counts."""
     assert peaks([(9.5, 0.0), (10.0, 2e-4), (10.2, 0.0), (10.5, 2e-4), (10.7, 0.0), (11.5, 1e-4), (12.0, 0.0)]) == [
         *(10.0, 10.5),
     ]
@@ -92,8 +92,10 @@ def swung(maxima: list[float], minima: list[float], leg: float) -> float:
 
 
 def test_period_of_uneven_swings() -> None:
-    """From the first maximum of the last quarter, which begins at 15 s, to the last but one, the last being unfinished;
-    legs are half the amplitude or more."""
+    """The period is measured from the first maximum of the last quarter, at 15 s, to the last but one.
+
+    The last maximum is unfinished. Half-swings of at least half the amplitude count.
+    """
     assert swung([14.0, 15.0, 16.2, 18.0, 19.0], [14.5, 15.5, 16.6, 18.5], 1.0) == pytest.approx(1.5)
     assert np.isnan(swung([14.0, 15.0, 16.2, 18.0, 19.0], [14.5, 15.5, 16.6, 18.5], 0.99))
     assert swung([14.9, 16.2, 18.7], [15.2, 17.2, 19.6], 1.0) == pytest.approx(2.5)  # of two maxima

@@ -1,4 +1,4 @@
-"""Where curves of the edge of hunting meet in the plane of two keys, of curves that are made up."""
+"""Meetings of two curves of the edge of hunting in the plane of two keys, on invented curves."""
 
 from typing import Any
 
@@ -52,7 +52,7 @@ def bent(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_crossing_is_refined_by_cycles(
     monkeypatch: pytest.MonkeyPatch, amplitude: float, period: float, same: bool
 ) -> None:
-    """Also between cycles of which one has twice the period of the other, as where periods double."""
+    """A crossing is also refined if one cycle has twice the other's period, as at a period doubling."""
     bent(monkeypatch)
     (meeting,) = find_meetings(SPACE, [LEVEL, curve(STEEP, amplitude, period)], 1e-9)
     assert (meeting.curves, meeting.kind, meeting.same_cycle) == ((0, 1), "cross", same)

@@ -47,7 +47,7 @@ def test_every_stabilising_pid_has_a_limit_cycle_with_a_gap_and_none_without() -
 
 
 def test_a_pid_with_a_gap_swings_about_its_own_limit_cycle() -> None:
-    """From nearer the mass stops farther away, from farther nearer."""
+    """From a smaller distance the mass stops farther away than it began, from a larger one nearer."""
     pid = switch.drawn(1)[0]
     size, _ = pid.cycle()
     assert -pid.stop(size, switch.GAP)[0] == pytest.approx(size, rel=1e-9)

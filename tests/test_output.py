@@ -70,7 +70,7 @@ def commands_with(option: str) -> set[str]:
 
 
 def tree(folder: Path) -> dict[str, bytes | None]:
-    """All that is in a folder, files with what they hold."""
+    """Return all entries of a folder by relative path: a file's content, or None for a folder."""
     return {str(path.relative_to(folder)): None if path.is_dir() else path.read_bytes() for path in folder.rglob("*")}
 
 
@@ -198,7 +198,7 @@ def test_a_folder_in_which_a_killed_process_was_writing_is_gone_on_with(
 def test_a_file_that_friso_has_not_written_stays(
     tmp_path: Path, refused: Refused, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Not even in a folder of its own, unless told."""
+    """A file of the user stays even in a folder that friso made, unless `overwrite` is set."""
     place(tmp_path / "out").write({"page.html": ""})
     (tmp_path / "out" / "figure.png").write_text("mine")
     with refused():
@@ -220,7 +220,10 @@ def test_unfinished_work_is_kept_nowhere_else(tmp_path: Path) -> None:
 def test_a_file_that_appears_while_others_are_drawn_stays(
     tmp_path: Path, links: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only what was there, and may be replaced, is: not what others put there meanwhile, be it a link to nothing."""
+    """Only files that existed before and may be replaced are replaced.
+
+    A file that others create meanwhile stays, even if it is a link to nothing.
+    """
     out = tmp_path / "out"
     place(out).write({"a.txt": "old"})
 
@@ -274,7 +277,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def write_over(files: dict[Path, Content]) -> list[Path]:
-    """Write files in place of what is there."""
+    """Write files, replacing existing ones."""
     return write(files, [*files])
 
 
@@ -327,7 +330,7 @@ def test_an_error_while_files_get_their_names_is_undone(
 
 
 def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -> None:
-    """By the next that writes, when there is one."""
+    """The next command that writes there removes them, once the folder exists."""
     write_over({tmp_path / "out" / "a" / "page.html": ""})
     left = [folder / f"{DRAFTS}left" for folder in (tmp_path, tmp_path / "out", tmp_path / "out" / "a")]
     for draft in left:
@@ -339,7 +342,7 @@ def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -
 
 @posix
 def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
-    """A link would have a lock made, and what was in it lost, in a folder of this user."""
+    """A draft that is a link would lead to a lock being created, and data lost, in another folder of this user."""
     mine = tmp_path / "mine"
     mine.mkdir(mode=0o700)
     (mine / "lock").write_text("precious")
@@ -354,7 +357,7 @@ def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
 
 
 def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whenever the process is killed: the earlier file or the new one. On a disk without links, too."""
+    """The file is the earlier or the new one whenever the process is killed, also on a disk without hard links."""
     real, seen = Path.replace, []
 
     def replace(path: Path, target: Path) -> Path:
@@ -372,7 +375,7 @@ def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
-    """Those of one that is alive stay."""
+    """Drafts of a process that still runs stay."""
     left, alive = (folder / f"{DRAFTS}{name}" for name in ("left", "alive"))
     for draft in (left, alive):
         draft.mkdir(mode=0o700)
@@ -388,7 +391,7 @@ def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
 def test_a_signal_while_files_get_their_names_waits(
     folder: Path, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All files are there when it arrives."""
+    """All files have their names when the signal is handled."""
     seen: list[int] = []
     real = Path.replace
 

@@ -64,7 +64,7 @@ def test_its_slow_gains_are_those_of_its_formula(whole: Stage) -> None:
 
 
 def test_both_realisations_agree_on_a_slow_motion(whole: Stage) -> None:
-    """What the drive commands at its samples, and the force in continuous time."""
+    """One realisation is what the drive commands at its samples, the other the force in continuous time."""
     run = friso.simulate(whole.replace({"joint.locked": True, "motion": {**SLOW}}), 1e-8, 250e-6, continuous=True)
     names = {"reference", "position", "force", "force_p", "force_i", "force_d"}
     assert names <= {*map(str, run)}
@@ -88,7 +88,7 @@ def answer(folder: Path, stage: Stage, command: str, *arguments: object, status:
 
 
 def test_check(locked: Stage, tmp_path: Path) -> None:
-    """Its cycle's multiplier is that of a simulation beside it; the remedy is in its own word and number."""
+    """The multiplier of its cycle is that of a simulation; the remedy names its own key and value."""
     document = answer(tmp_path, locked, "check")
     case = document["cases"]["given"]
     assert case["verdict"] in ("hunts", "bistable")
@@ -100,7 +100,7 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
 
 
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
-    """Of all cycles of the stage none attracts beyond the edge."""
+    """None of the stage's cycles is stable beyond the edge."""
     document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
     assert document["branches"]
     assert min(abs(point["value"] - EDGE) for point in document["points"]) < 0.05
@@ -154,7 +154,7 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
 
 
 def test_tune(locked: Stage, tmp_path: Path) -> None:
-    """Its cycles are known and its bandwidth is tuned; so few machines let nothing be sure to work."""
+    """The answer knows the stage's cycles and tunes its bandwidth; with so few machines no remedy is sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=3)
     with patched({method: {"Budget": lambda: tiny, "remedies": lambda *goal: remedies(*goal)[:1]}}):
         document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um", status=2)
@@ -166,7 +166,7 @@ def test_tune(locked: Stage, tmp_path: Path) -> None:
 
 
 def test_export(locked: Stage, tmp_path: Path) -> None:
-    """Its keys by their units, its loop as a box, and the limit that every controller may have."""
+    """The export has the controller's keys with units, its loop as a box, and the limit common to all controllers."""
     save(locked, tmp_path / "stage.toml")
     document = json.loads(friso_inside(tmp_path, "export", "gains", "stage.toml", "--json").stdout)
     gains = {row["symbol"]: row["values"] for row in document["gains"]}

@@ -1,4 +1,4 @@
-"""Parameter files of drives: to stages by the formulas of their firmware, and back; and what is no such file."""
+"""Parameter files of drives: to stages by the formulas of their firmware, and back; and files that are refused."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force
 
 
 def test_a_variable_that_stands_twice_counts_once_and_is_named(tmp_path: Path) -> None:
-    """As in LinuxCNC, the first; and comments may be in Latin-1."""
+    """The first value counts, as in LinuxCNC. Comments may be in Latin-1."""
     path = ini(tmp_path, {"P": 50, "I": 100})
     answers = {**MACHINE, "force_per_output": "20 N"}
     expected = stage_from(path, None, answers)
@@ -179,7 +179,7 @@ def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: 
 
 @pytest.mark.parametrize("name", ["joints.inc", "below/joints.inc", "../outside.inc", "/etc/hostname", "beside.inc"])
 def test_what_include_names_is_read_inside_the_folder_alone(tmp_path: Path, name: str) -> None:
-    """By no link either; what is taken in may not take in more, as LinuxCNC has it."""
+    """A link to outside is not followed either. An included file may not include others, as in LinuxCNC."""
     folder = tmp_path / "machine"
     (folder / "below").mkdir(parents=True)
     path = ini(folder, {})
@@ -209,7 +209,10 @@ def test_units_that_contradict_each_other_are_asked_for(tmp_path: Path) -> None:
 
 
 def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
-    """With an output in machine units per second, as FF1 = 1 says; steps and an encoder are a servo axis too."""
+    """The output is in machine units per second, as FF1 = 1 shows.
+
+    An axis with a step generator and an encoder is a servo axis as well.
+    """
     gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
     gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0, "HOME_OFFSET": 2.0}
     gains |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
@@ -269,7 +272,8 @@ def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
     assert flat["controller.velocity_feedforward"] == pytest.approx(1.0)
     assert flat["controller.position_integral_time"] == pytest.approx(5.0)
     assert not any("velocity_per_output" in sentence for sentence in drawn.left_out)
-    back = gains_of(friso.loads(drawn.text()), {}, "linuxcnc").parameters  # it was told, and is not asked for again
+    # the drawn stage contains the answer, which is not asked for again
+    back = gains_of(friso.loads(drawn.text()), {}, "linuxcnc").parameters
     assert back is not None
     assert [back[name] for name in ("P", "I", "FF1")] == pytest.approx([50.0, 10.0, 0.2])
     uncertain = drawn.stage.replace({"drive.velocity_per_output": "5 mm/s +/- 1 mm/s"})
@@ -430,7 +434,7 @@ def test_where_nothing_tells_turns_from_counts_it_is_asked(tmp_path: Path) -> No
 
 
 def _tokens(text: str) -> list[tuple[int, int]]:
-    """Where values stand in a file: behind an equals sign or a colon, to the end of the line or the next comma."""
+    """Return the spans of all values: after an equals sign or a colon, up to a comma or the line's end."""
     return [match.span(1) for match in re.finditer(r"[=:] *([\w.+-]+)(?= *[,}#\n])", text)]
 
 

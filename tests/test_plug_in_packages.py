@@ -1,4 +1,4 @@
-"""What installed packages add to friso: found by their entry points, named, and left out where it is of no use."""
+"""What installed packages add to friso: found by entry points, named, and ignored where unusable."""
 
 import json
 import math
@@ -44,7 +44,10 @@ Points = Mapping[str, str]
 
 
 def package(folder: Path, name: str, **points: str | Points) -> None:
-    """What pip leaves of a package that declares entry points: by group a module, or modules by name."""
+    """Write the metadata that pip installs for a package with entry points.
+
+    `points`: for each group a module, or modules by name.
+    """
     info = folder / f"{name}-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
@@ -112,7 +115,7 @@ def test_a_stage_file_uses_one_and_page_and_document_name_it(installed: Path) ->
 
 
 def test_processes_that_compile_and_that_compute_cells_know_one(installed: Path) -> None:
-    """Neither imports the package before it is handed a stage with its controller."""
+    """Neither process imports the package before it receives a stage with the package's controller."""
     bandwidths = "controller.bandwidth=8 Hz, 9 Hz"
     done = friso_command(installed, "map", "stage.toml", "--x", bandwidths, "--workers", "2", "--out", "m", "--json")
     assert done.returncode == 0, done.stderr
@@ -263,7 +266,7 @@ def test_a_question_that_is_of_no_use_is_one_sentence_and_hinders_no_other(
 
 
 def write_question(folder: Path, declared: str, module: str) -> None:
-    """The package of a question: what it declares, and the module of its function."""
+    """Write the package of a question: its declaration, and the module of its function."""
     folder.mkdir()
     (folder / "__init__.py").write_text(QUESTION.format(declared=declared))
     (folder / "question.py").write_text(module)

@@ -85,7 +85,7 @@ def test_a_law_of_ones_own(place: str, tmp_path: Path) -> None:
 
 
 def test_one_process_builds_several_kernels_of_a_law_of_a_script(tmp_path: Path) -> None:
-    """It registers the law once."""
+    """The process registers the law once."""
     assert run(tmp_path, LAW + SEVERAL).strip() == "2"
 
 

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 def test_processes_of_its_own_verify_too_and_open_no_port(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nor do they run what lies in the current folder under the name of a module that they import."""
+    """The processes also do not run a file in the current folder that has the name of a module they import."""
     seen: list[psutil.Process] = []
     hostile = "open('run', 'w').close()\nraise SystemExit\n"
     (tmp_path / "multiprocessing.py").write_text(hostile)
@@ -79,7 +79,7 @@ with processes(1) as crew:
 
 
 def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And the other workers end with it."""
+    """The other workers end as well."""
     waited: list[object] = []
     real = execute.wait
 
@@ -103,7 +103,7 @@ def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.
 @posix
 @pytest.mark.parametrize("kill", [False, True])
 def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> None:
-    """Also by workers whose parent was killed."""
+    """Workers whose parent was killed remove it, too."""
     (tmp_path / "open").mkdir()
     (tmp_path / "open").chmod(0o777)
     (tmp_path / "parent.py").write_text(f"if __name__ == '__main__':\n{textwrap.indent(PARENT, '    ')}")
@@ -132,7 +132,7 @@ def test_workers_end_with_who_started_them(tmp_path: Path) -> None:
 
 @posix
 def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
-    """In the worker too, which would be at it for minutes."""
+    """The worker, too, ends at once instead of after minutes."""
     axes = {"controller.crossover": "2 Hz..16 Hz:200", "joint.stroke": "0.1 mm..1 mm:200"}
     with processes(1) as crew:
         study = Request(rig, axes).study(rtol=1e-12)

@@ -34,7 +34,7 @@ PLATFORMS = {
 
 @pytest.mark.parametrize("platform", PLATFORMS, ids=lambda platform: platform.triple)
 def test_code_for_other_platforms_needs_nothing_else(platform: Processor) -> None:
-    """Neither a mathematics library nor anything of a compiler's: LLVM resolves what is left in the process itself."""
+    """The code needs neither a mathematics library nor a compiler's runtime; LLVM resolves all other symbols itself."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     machine = platform.target_machine()
@@ -46,7 +46,7 @@ def test_code_for_other_platforms_needs_nothing_else(platform: Processor) -> Non
 
 
 def missing_symbols(machine: llvm.TargetMachine, module: ir.Module) -> set[str]:
-    """What a module's object file, of ELF or Mach-O, expects elsewhere."""
+    """Return the undefined symbols of a module's object file, in ELF or Mach-O format."""
     code = machine.emit_object(optimised(module, machine))
     return _elf(code) if code.startswith(b"\x7fELF") else _mach_o(code)
 

@@ -50,7 +50,7 @@ def test_stick_slip(stick_slip: xr.Dataset) -> None:
 
 @CART
 def test_stick_slip_plateaus(stick_slip: xr.Dataset) -> None:
-    """Where it sticks, it still creeps by some micrometres: the numbers hold at these times."""
+    """While it sticks it still creeps by some micrometres: the numbers hold at these times."""
     plateaus = stick_slip.position.sel(time=[12, 18, 25], method="nearest")
     assert plateaus.to_numpy() == pytest.approx([0.636293, 1.272562, 1.908839], abs=0.6e-6)
     assert stick_slip.velocity.sel(time=[12, 18, 25], method="nearest").to_numpy() == pytest.approx(0, abs=1e-5)

@@ -1,4 +1,4 @@
-"""What someone meets who calls friso from Python."""
+"""What a user meets who calls friso from Python: results, errors and progress."""
 
 import inspect
 import pickle

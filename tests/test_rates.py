@@ -38,7 +38,10 @@ def member_of(case: Stage) -> Members:
 
 
 def by_hand(case: Stage, gain: float = 1.0, outer: float = 1.0) -> np.ndarray:
-    """How four samples take position, velocity, the force before, and the drive's numbers along, sample by sample."""
+    """Return the matrix over four samples, built sample by sample.
+
+    It takes position, velocity, the previous force and the drive's numbers from the beginning to the end.
+    """
     flat = case.flat()
     open_plant = friso.linear(case, CASE, "plant")
     row = open_plant.find_output("stage")
@@ -123,7 +126,10 @@ def test_loops_of_a_cascade_in_continuous_time_against_python_control() -> None:
 
 
 def test_two_encoders_at_several_rates() -> None:
-    """Poles are those of the loop sample by sample, by hand: position from the load, velocity from the motor."""
+    """The poles are those of the loop built by hand, sample by sample.
+
+    The position comes from the load's encoder, the velocity from the motor's.
+    """
     case = friso.load(friso.example("ball_screw_axis")).replace(
         {
             "controller": {"kind": "cascade", "kv": "60 1/s", "kp": "5500 N*s/m", "velocity_integral_time": "30 ms"},

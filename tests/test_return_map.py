@@ -1,4 +1,4 @@
-"""Hunting by its return map: maps that are known, the rig of the thesis against the search, and what is not a map."""
+"""Hunting by the return map: known maps, the thesis rig compared with the search, and results that are no map."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def of_function(after: np.ndarray, before: np.ndarray = DISTANCES) -> LandingMap
 @settings(deadline=None)
 @given(st.floats(0.2, 0.95), st.floats(0.1, 1.0))
 def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fixed: float) -> None:
-    """From everywhere, whatever the sign of the slope, but from where it lands out of the range that is known."""
+    """Runs converge to it from everywhere, whatever the sign of the slope, except where they leave the known range."""
     for sign in (1, -1):
         after = fixed * (DISTANCES / fixed) ** (sign * slope)
         (attractor,) = of_function(after).attractors
@@ -71,7 +71,7 @@ def test_beyond_a_flip_landings_alternate() -> None:
 
 
 def test_a_map_whose_returns_lie_in_a_narrower_range_than_its_points_is_not_at_rest() -> None:
-    """All landings come to the least of them, which no point is below."""
+    """All landings converge to the smallest distance, and no point of the map is below it."""
     near = np.geomspace(0.0496, 3.0, 60)
     assert of_function(0.04959 * (near / 0.0496) ** 0.01, near).attractors
 
@@ -103,7 +103,7 @@ def test_gaps_are_looked_for_where_the_map_comes_near_its_diagonal() -> None:
 
 
 def test_a_stage_that_hunts_in_a_narrow_range_beside_a_break_of_its_map() -> None:
-    """Nothing lands in that range from distances a fifth apart; the search, long runs and SciPy agree that it hunts."""
+    """No sampled point, a fifth apart, lands in that range; the search, long runs and SciPy agree that it hunts."""
     entries = tomllib.loads(Path(__file__).with_name("hard_stages.toml").read_text(encoding="utf-8"))["stages"]
     (entry,) = (entry for entry in entries if entry["name"] == "seed 1, number 27, beyond the edge once named")
     stage = Stage(**{key: value for key, value in entry.items() if isinstance(value, dict)})
@@ -179,7 +179,7 @@ def test_the_edge_of_the_locked_rig_by_maps(locked: Stage) -> None:
 
 
 def test_a_sketch_tells_where_the_locked_rig_hunts(locked: Stage) -> None:
-    """It hunts below 9.75 Hz; an unstable cycle goes on to a fold at 16.2 Hz."""
+    """The rig hunts below 9.75 Hz; an unstable cycle continues up to a fold at 16.2 Hz."""
     crossovers = np.array([8.0, 11.0, 14.0, 17.0])
     sketch = sketched(Ensemble.held({**locked.flat(), "controller.crossover": crossovers}, 4))
     assert sketch.attracts.tolist() == [True, False, False, False]
@@ -227,8 +227,10 @@ def test_bandwidths_that_no_work_was_left_for_make_no_edge(rig: Stage) -> None:
 
 
 def test_what_a_repelling_orbit_of_the_map_holds_beside_it_is_found() -> None:
-    """An orbit of four swings, 3 % about one of two that repels: points of the map are farther apart there. By
-    the search alone, too, its multiplier is -0.68."""
+    """A stable orbit of four swings lies within 3 % of an unstable orbit of two.
+
+    The sampled points of the map are farther apart there. The search alone also finds a multiplier of -0.68.
+    """
     locked = draw(7001, 83, "stages").variants()["locked"]
     stages = Ensemble.held(faster(locked.flat(), np.array([0.46])), 1)
     (motion,) = what_attracts(stages).motions

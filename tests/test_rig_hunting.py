@@ -1,4 +1,4 @@
-"""Hunting on the virtual rig: what becomes of runs, and what the experiment finds of the thesis's."""
+"""Hunting on the virtual rig: how runs end, and what the experiment finds of the thesis's figures."""
 
 from dataclasses import fields, replace
 from pathlib import Path
@@ -136,7 +136,7 @@ SMALL = {
 
 
 def test_free_joint_does_not_hunt() -> None:
-    """Fig. 24, and what is told of it."""
+    """The result agrees with Fig. 24, and the page says so."""
     with patched({hunting: SMALL}):
         outcome = hunting.run_experiment(RIG, 1, silent)
     assert not outcome.result.cases["free"].peaks.any()

@@ -41,7 +41,7 @@ def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path)
 
 
 def test_the_mass_line_of_a_free_joint_is_not_taken_for_the_whole_mass() -> None:
-    """With the resonance lost in friction the line above it is left, which is the stage's."""
+    """If friction hides the resonance, only the mass line above it remains, which is that of the stage alone."""
     for seed in range(20):
         machine = built(seed)
         alone, guess = machine.flat["masses.stage"], machine.guess
@@ -51,7 +51,7 @@ def test_the_mass_line_of_a_free_joint_is_not_taken_for_the_whole_mass() -> None
 
 
 def test_two_speeds_bound_friction_and_do_not_show_it(wording: Wording) -> None:
-    """Both below the Stribeck velocity: a straight line through them starts above Coulomb friction and falls."""
+    """With both speeds below the Stribeck velocity, the line through them starts above Coulomb friction and falls."""
     coulomb, rise, viscous, stribeck, sample_time = 1.0, 1.0, 10.0, 3e-3, 1e-3
     legs = []
     for speed in (1e-3, 2e-3) * 2:

@@ -1,4 +1,4 @@
-"""What the rig tells `friso identify` beside its logs, and what it refuses."""
+"""The setup that the rig states for `friso identify` beside its logs, and the logs that it refuses."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The tables of the drive as built and its surroundings: values, round trip, and what is wrong with them."""
+"""The stage file's tables for the real drive and its surroundings: values, round trip, and refused values."""
 
 import pickle
 import re

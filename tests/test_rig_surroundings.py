@@ -70,7 +70,7 @@ def test_factors_are_positive_and_follow_one_field(
 @settings(max_examples=6)
 @given(st.integers(0, 10**6), lengths, deviations, st.floats(-3, 3))
 def test_mean_and_deviation_over_rails(first: int, length: float, deviation: float, place: float) -> None:
-    """At one place of many rails."""
+    """The statistics are those at one place of many rails."""
     count = 1500
     flat = rail(static_deviation=deviation, correlation_length=length)
     values = np.array([friction_factors(flat, np.array([place]), first + k)[:, 0] for k in range(count)])

@@ -28,7 +28,7 @@ LENGTHS = re.compile(r"[0-9]\s(?:[mnµu]?m|k?N|kg)(?![a-zA-Z·*])")
 
 
 def turned(value: Any) -> Any:
-    """What is written in a stage file, on a rotary axis."""
+    """Return a value of a stage file with the unit of a rotary axis."""
     if isinstance(value, dict):
         return {key: turned(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -125,7 +125,7 @@ def test_a_torque_is_no_force(pair: tuple[Stage, Stage]) -> None:
     "asks", [friso.design, outline, partial(friso.design, spec=EXAMPLES / "specs" / "thesis.toml")]
 )
 def test_no_leaf_springs_are_designed_for_an_axis_that_turns(pair: tuple[Stage, Stage], asks: Callable) -> None:
-    """Neither from a specification nor without; none is written to begin with."""
+    """The design refuses it with a specification and without; no specification is written."""
     with pytest.raises(InputError, match="leaf springs guide along a line"):
         asks(pair[1])
 
@@ -199,7 +199,7 @@ COMMANDS = {
 
 
 WRITTEN = (("check", "rotary"), ("map", "linear"), ("map", "rotary"))
-"""Commands, and their stages, whose pages and figures are drawn, too."""
+"""Commands and kinds of axis whose pages and figures are drawn as well."""
 
 
 LONG = {"boundary": pytest.mark.thorough}

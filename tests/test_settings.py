@@ -35,8 +35,10 @@ LITERALS = {
     "friso_thesis/shown": 1,
     "friso_thesis/studies": 179,
 }
-"""Numbers that modules of each room may still give a name of their own, outside its settings. A room that has moved its
-tuning numbers keeps here those of physics, mathematics and formats; no entry may grow."""
+"""Number of constants that each folder's modules may still define outside its settings.
+
+A folder with settings keeps here only constants of physics, mathematics and formats; no entry may grow.
+"""
 
 SHORTEST_REASON = 20
 """Characters of a reason that says anything."""
@@ -78,7 +80,7 @@ def test_tuning_numbers_are_settings() -> None:
 
 
 def named_numbers(source: str) -> int:
-    """How many names of a module stand for numbers, or for tuples and lists of numbers alone."""
+    """Return how many names in a module stand for numbers, or for tuples and lists of numbers alone."""
     values: list[ast.expr] = []
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:

@@ -14,7 +14,7 @@ from friso.engine.side_by_side import cores_to_use, side_by_side
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_results_come_in_the_order_of_the_tasks(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With two cores the first waits for the second."""
+    """With two cores the first task waits for the second."""
     monkeypatch.setattr(module, "usable_cores", lambda: cores)
     second = Event()
     if cores == 1:

@@ -41,7 +41,7 @@ def powers(B):
 
 
 def values(function: Callable[..., None], x: np.ndarray) -> np.ndarray:
-    """What the compiled function makes of each number."""
+    """Return the compiled function's value for each number."""
     return in_all(function, np.stack([x, x]))[1]
 
 

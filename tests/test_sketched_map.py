@@ -42,7 +42,7 @@ def test_the_default_map_is_a_sketch_of_the_verdicts_that_a_search_gives(locked:
 
 
 def test_a_cell_has_the_verdict_that_check_gives(locked: Stage) -> None:
-    """At half its static friction the rig is within 10 um soon at its last place, but not at the one before it."""
+    """At half its static friction the rig is soon within 10 um at its last place, but not at the one before."""
     stage = locked.replace({"friction.static": "1.5 N"})
     runs = friso.sweep(stage, {"controller.crossover": ["8 Hz", "9 Hz"]}, confirm=True)
     for k, crossover in enumerate(("8 Hz", "9 Hz")):

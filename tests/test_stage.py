@@ -173,7 +173,7 @@ def test_numbers_are_written_as_people_do_and_read_again_as_the_same(rig: Stage)
 
 
 def test_template_with_its_optional_lines_loads() -> None:
-    """All of it but the controller's other form."""
+    """Only the alternative form of the controller stays commented out."""
     lines = TEMPLATE.read_text(encoding="utf-8").splitlines()
     other_form = ("# kp", "# ki", "# kd", "# tau", "# derivative_on", "# kind")
     inputs = [line if line.startswith(other_form) else re.sub(r"^# (\[|\w+ = )", r"\1", line) for line in lines]
@@ -375,7 +375,7 @@ def test_a_typed_number_has_the_unit_in_which_the_file_has_the_key(rig: Stage, v
 
 
 def test_no_unit_is_guessed_that_may_be_another(rig: Stage) -> None:
-    """None where the file has no such key, for numbers in Python, or where other capitals mean another unit."""
+    """No unit is suggested if the file has no such key, for numbers in Python, or if capitals mean another unit."""
     for wrong in (["bias.cart=1"], ["masses.cart=1 kgs"], {"controller.crossover": 12}, ["controller.crossover=5 mHZ"]):
         with pytest.raises(InputError, match="unit"):
             stage_of(rig, wrong)  # type: ignore[arg-type]

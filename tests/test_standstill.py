@@ -1,5 +1,7 @@
-"""Settings against friction, beside any controller: against a model by hand, as a drive carries them out, and what is
-said of hunting with them."""
+"""Settings against friction (dead band, leak, limits), beside any controller.
+
+They are compared with a model written by hand and with a real drive; the statements on hunting with them are tested.
+"""
 
 from __future__ import annotations
 
@@ -103,8 +105,10 @@ def test_a_trace_against_a_model_by_hand(name: str) -> None:
 
 
 def test_a_drive_carries_them_out_alike() -> None:
-    """Both realisations: what the drive commands at its samples against the continuous controller, in a slow motion
-    in which neither the reset nor the hysteresis differ by a sample."""
+    """The drive's commands at its samples agree with the continuous controller in a slow motion.
+
+    In that motion neither the reset nor the hysteresis differ by a sample.
+    """
     import sympy as sp
 
     chosen = machine({key: value for part in SETTINGS.values() for key, value in part.items()}, limit("3.5 N"))
@@ -161,7 +165,7 @@ def test_a_drive_carries_them_out_alike() -> None:
 
 
 def test_a_dead_zone_before_a_filter_runs_on_a_machine_as_built() -> None:
-    """As in continuous time, if the drive samples fast: the filter passes what the dead zone leaves of the error."""
+    """If the drive samples fast, it runs as in continuous time: the filter passes the error outside the dead zone."""
     move = there_and_back("0.4 s", "0.3 s").replace("100 m/s^2", "1 m/s^2").replace("30 ms", "50 ms")
     chosen = stage(move, friction=lugre(2), controller=van_dijk("8 Hz", 'error_deadband = "80 um"'))
     ideal = friso.simulate(chosen, 1e-8, 1e-3)["position"].values[:-1]
@@ -197,7 +201,7 @@ def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
 
 
 def test_an_integral_that_leaks_is_waited_for_until_it_changes_no_more() -> None:
-    """At the rate at which it begins it would take 60 000 s to wind up to the break-away force."""
+    """At its initial rate the integral would take 60 000 s to reach the break-away force."""
     stages = Ensemble.held(machine(SETTINGS["leak"]).flat(), 1)
     begun = stuck(stages, 1e-6 * stages.length)
     waited = wait(stages, 1e-6 * stages.length)

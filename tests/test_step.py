@@ -88,7 +88,10 @@ class Lanes:
 
 
 def sine(turn: Any) -> Any:
-    """As the engine computes it, to more digits than a float has: its rounding to whole turns takes a float."""
+    """Return the sine of a turn as the engine computes it, in more digits than a float has.
+
+    The engine's rounding to whole turns needs a float.
+    """
     return quarter_sine(0.25 - abs((turn + 0.25) % 1 - 0.5))
 
 
@@ -138,7 +141,7 @@ def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> No
         try:
             expected = twin.step(lanes, lane, x)
             sizes, last = np.abs(expected.k), np.abs(np.array([*twin.tableau.a[-1], 1.0]))
-            magnitude = np.abs(x) + last @ sizes  # of what is added up in a stage
+            magnitude = np.abs(x) + last @ sizes  # of the terms that are summed in a stage of the method
             nudged = twin.step(lanes, lane, x + 1e-15 * np.cos(np.arange(x.size)) * magnitude)
         except FloatingPointError:
             continue

@@ -209,7 +209,7 @@ FOLLOW = {"friction.static": "3 * friction.coulomb", "friction.coulomb": "0.9 * 
 def test_a_store_of_nearly_the_same_study_is_refused(
     rig: Stage, tmp_path: Path, first: dict, second: dict, refused: Refused
 ) -> None:
-    """Other sampled keys with the same values, fewer of them, the same links in another order."""
+    """Studies with other sampled keys of equal values, fewer keys, or links in another order are refused."""
     with Store.opened(tmp_path / "a.zarr", Request(rig, **{"axes": {}, **first}).study()):
         pass
     with refused():
@@ -254,7 +254,7 @@ def unreadable_archive(stream: BinaryIO) -> None:
 def test_answers_are_those_of_their_study_and_no_larger(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Others are asked for: of another study of that form, of other metrics, with too much in them."""
+    """Answers of another study of that shape, of other metrics, or with too much in them are computed anew."""
     study, cells, asked = Request(rig, AXES).study(["peaks", "outcome"]), np.arange(5), []
 
     def ask(cells: np.ndarray) -> dict[str, np.ndarray]:
@@ -263,7 +263,7 @@ def test_answers_are_those_of_their_study_and_no_larger(
         return {name: np.full(len(cells), "rests" if is_text(name) else 1.0) for name in names}
 
     def keeping(digest: str = "a study") -> int:
-        """How often it was asked by then."""
+        """Return how many times `ask` has been called so far."""
         KeptCells(tmp_path, study, digest).keeping(ask)(cells)
         return len(asked)
 
@@ -358,7 +358,7 @@ def test_a_store_is_there_whole_or_not_at_all(
 
 
 def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path) -> None:
-    """Nor time where it is looked at; nor is it gone on with unless it is meant: it may come from others."""
+    """A large store also opens quickly, and it is continued only on purpose, since it may come from others."""
     path, axes = tmp_path / "large.zarr", {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}
     study = Request(rig, {key: f"{ends.split(':')[0]}:20000" for key, ends in axes.items()}).study()
     store = Store(path, study)
@@ -457,7 +457,7 @@ def test_a_chunk_that_may_not_be_read_is_named_beside_those_that_are_damaged(
 def test_a_damaged_block_is_run_again(
     stored: Path, finished: Path, rig: Stage, name: str, place: float, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """What a flipped bit changes is never believed."""
+    """Results of a block with a flipped bit are never used."""
     flip(stored / name / "1.0", place)
     with Store.opened(stored, Request(rig, AXES).study()) as store:
         missing = list(store.missing())
@@ -486,7 +486,7 @@ CUT = b"cut"
 def test_metadata_of_any_content_are_written_anew_from_their_copy(
     stored: Path, rig: Stage, content: bytes, refused: Refused, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Where that is damaged too they are refused."""
+    """If the copy is damaged too, the store is refused."""
     runs, file = read_store(stored).load(), stored / ".zmetadata"
     whole = file.read_bytes()
     damaged = whole[: len(whole) // 2] if content == CUT else content
@@ -562,7 +562,7 @@ def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: s
 def test_a_folder_in_place_of_a_file_and_a_file_in_place_of_a_folder_are_refused(
     stored: Path, finished: Path, rig: Stage
 ) -> None:
-    """By whoever checks the store, goes on with it or would replace it; once they are removed, it is written again."""
+    """Checking the store, continuing it and replacing it all refuse it; once they are removed, it is written again."""
     study, other = Request(rig, AXES).study(), Request(rig, AXES).study(rtol=1e-4)
     files = [stored / name for name in (".zgroup", "peaks/.zarray", ".blocks/0.0", "peaks/0.0", ".answers/0.npz")]
     for path in [*files, *(stored / name for name in (".blocks", "peaks", ".answers"))]:
@@ -611,7 +611,10 @@ def test_metadata_name_no_file_outside_their_store(stored: Path, rig: Stage, nam
 
 @contextmanager
 def sealed_again(stored: Path) -> Iterator[dict[str, Any]]:
-    """The metadata of a store, to be changed as whoever knows friso can: the digest is that of what is changed."""
+    """Yield the metadata of a store for changes, and write them back with a matching digest.
+
+    Someone who knows friso could forge a store in this way.
+    """
     document = json.loads((stored / ".zmetadata").read_text())
     yield document["metadata"]
     entry = document["friso"]
@@ -738,7 +741,7 @@ def test_what_is_no_store_is_not_replaced_even_when_told(rig: Stage, tmp_path: P
 
 
 def test_files_of_others_in_a_store_do_not_go_with_it(stored: Path, rig: Stage, tmp_path: Path) -> None:
-    """Nor does a folder whose metadata speak of equations, but not of friso."""
+    """A folder whose metadata mention equations, but not friso, is not removed either."""
     other = Request(rig, {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}).study()
     for name in ("notes.txt", "mine/thesis.txt", "peaks/notes"):
         (stored / name).parent.mkdir(exist_ok=True)
@@ -781,7 +784,7 @@ def exchange(first: Path, second: Path) -> None:
 def test_exchanged_chunks_are_run_again(
     stored: Path, finished: Path, rig: Stage, names: list[str] | None, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Whole as they are, they are those of other cells; even with all that belongs to them (None)."""
+    """The chunks are intact, but belong to other cells, even if all that belongs to the cells is exchanged (None)."""
     for name in names or [*read_store(stored).data_vars, ".blocks"]:
         exchange(stored / str(name) / "0.0", stored / str(name) / "1.0")
     assert check_store(stored).damaged == ["0.0", "1.0"]
@@ -831,7 +834,7 @@ def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path, refused: Refused
 
 
 def test_blocks_of_another_study_are_run_again(stored: Path, finished: Path, rig: Stage, tmp_path: Path) -> None:
-    """Of the same form, at another tolerance."""
+    """The other study has the same shape, but another tolerance."""
     other = sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
     for name in [*other.data_vars, ".blocks"]:
         exchange(tmp_path / "b.zarr" / str(name) / "1.0", stored / str(name) / "1.0")
@@ -880,7 +883,7 @@ def test_files_that_were_being_written_go_but_no_others(stored: Path, rig: Stage
 def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
     stored: Path, finished: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nor where the process is killed between the two renames: the next puts it back."""
+    """The store also stays if the process is killed between the two renames: the next command puts it back."""
     other = Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
 
     def full(*arguments: object, **named: object) -> None:

@@ -61,7 +61,7 @@ def test_order_of_the_error_estimate(method: Tableau) -> None:
 @METHODS
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.8])
 def test_order_of_the_dense_output(method: Tableau, theta: float) -> None:
-    """Inside a step the local error is of one order more than that of the dense output: 4 (Rodas5P), 3 (Rodas4)."""
+    """Within a step the local error has one order more than the dense output: 4 (Rodas5P), 3 (Rodas4)."""
     jacobian, drift = derivatives(START, 0)
     errors = []
     for h in (1 / 64, 1 / 128):
@@ -73,8 +73,10 @@ def test_order_of_the_dense_output(method: Tableau, theta: float) -> None:
 
 @METHODS
 def test_l_stability(method: Tableau) -> None:
-    """On x' = -lambda x an infinitely fast decay is gone after one step, and no step grows on the imaginary axis
-    or left of it."""
+    """For x' = -lambda x an infinitely fast decay vanishes in one step.
+
+    No step grows on the imaginary axis or to its left.
+    """
 
     def growth(z: complex) -> float:
         """abs(R(z)) through the real 2 x 2 system with eigenvalue z."""

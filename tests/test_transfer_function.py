@@ -118,7 +118,7 @@ def test_a_faster_controller_has_gain_and_frequencies_scaled(factor: float) -> N
 
 @pytest.mark.parametrize("limit", [{}, {"force_limit": "7 N"}], ids=["free", "limited"])
 def test_the_trace_is_that_of_the_pid_controller_that_it_is(limit: dict[str, str]) -> None:
-    """With a force limit the integral rests at it, by the same anti-windup."""
+    """With a force limit the integral stays at the limit, by the same anti-windup."""
     one = simulate(Stage(**{**TABLES, "controller": {**PID, **limit}}), 1e-10, 1e-4)
     other = simulate(controlled({"numerator": NUMERATOR, "denominator": DENOMINATOR, **limit}), 1e-10, 1e-4)
     deflection = 3.0 / KP
@@ -154,7 +154,10 @@ def test_coefficients_for_samples_run_as_they_are(transfer: tuple[list[float], l
 
 @pytest.mark.parametrize("divided", [1, 4])
 def test_the_integral_unwinds_by_its_own_samples(divided: int) -> None:
-    """By hand: a PI controller at every 2 ms, back calculation within 20 ms, and a drive that samples more often."""
+    """The reference is computed by hand: a PI controller at every 2 ms in a drive that samples more often.
+
+    Its back calculation has a time constant of 20 ms.
+    """
     step, unwinding, limit, inside = 2e-3, 20e-3, 3.0, 0.0
     numerator, denominator = [6e4 + 6e5 * step / 2, 6e5 * step / 2 - 6e4], [1.0, -1.0]
     keys = {"numerator": numerator, "denominator": denominator, "sample_time": "2 ms", "force_limit": "3 N"}
@@ -191,7 +194,7 @@ def test_a_slow_pole_winds_up_as_an_integral_does(pole: float) -> None:
 
 @pytest.mark.inner
 def test_a_lag_that_winds_up_without_an_integral_is_not_surely_calm() -> None:
-    """Two slow poles: "cannot hunt" was told of a stage that simulation shows to hunt."""
+    """The controller has two slow poles: "cannot hunt" was said of a stage that hunts in simulation."""
     fast = np.polymul([KD + KP * TAU, KP + KI * TAU, KI], [1.0, 5.0])
     slow = np.polymul([1.0, 0.02, 0.0002], [TAU, 1.0])
     half = 2.0 ** np.arange(3, -1, -1)  # C(2 s)/4, half as fast
@@ -218,7 +221,7 @@ def test_a_filter_that_lags_winds_up() -> None:
 
 @pytest.mark.inner
 def test_a_lag_of_a_tenth_hunts_where_hardly_any_coulomb_friction_brakes() -> None:
-    """Two poles at 0.5 1/s and a static gain 1.11 times that of a slip: +-0.98 mm every 2.2 s."""
+    """Two poles at 0.5 1/s, and a static gain 1.11 times that which slip needs: +-0.98 mm every 2.2 s."""
     slow, fast = np.poly([-0.5, -0.5]), np.poly([-0.5 / np.sqrt(0.9)] * 2)
     friction = {**TABLES["friction"], "static": "1 N", "coulomb": "0.02 N", "stribeck_velocity": "1 mm/s"}
     friction |= {
@@ -319,7 +322,10 @@ def test_samples_that_do_not_divide_are_refused() -> None:
 
 @pytest.mark.parametrize("step", [0.5e-3, 8e-3])
 def test_what_only_samples_make_unstable_is_told_first(step: float, own_bandwidth: None) -> None:
-    """By hand, without friction: the poles of the free mass behind a zero-order hold, and of the controller in z."""
+    """The poles are computed by hand without friction.
+
+    They are those of the free mass behind a zero-order hold, and of the controller in z.
+    """
     transfer = ([6e4 * 1e-3 + 500, 6e4 + 6e5 * 1e-3, 6e5], [1e-3, 1.0, 0.0])
     numerator, denominator, _ = signal.cont2discrete(transfer, step, "bilinear")
     hold = step**2 / 2 / 1.7
@@ -343,7 +349,7 @@ def test_a_multisine_with_phases_says_how_far_it_jumps_at_first() -> None:
 
 
 def test_a_stage_that_hunts_after_a_move_back_swings() -> None:
-    """Its last move counts for nothing: half of the deviation in the last half of the run is that of the move."""
+    """The last move does not count, although half of the deviation in the run's last half comes from it."""
     stage = controlled({"numerator": [95.0, 6250.0, 1e5], "denominator": [2.5e-3, 1.0, 0.0]})
     answer = friso.simulate(stage.replace({"motion.dwell": "5 s"}))
     assert "swings ±157 µm every 63" in answer.sentences()[0]

@@ -132,7 +132,7 @@ def test_each_mistake_has_one_message(changes: dict[str, object], fragment: str)
 
 
 def test_an_encoder_that_no_controller_reads_is_named() -> None:
-    """Not where the controller takes a velocity, nor where both are on one side."""
+    """An encoder is not named if the controller uses a velocity, or if both encoders are on one side."""
     sides = {"position": "load", "velocity": "motor"}
     cascade = {"kind": "cascade", "kv": "40 1/s", "kp": "4e3 N*s/m"}
     for controller, idle in ((USUAL, 1), ({**BY_RATE, "kd": "0 N*s/m"}, 1), (BY_RATE, 0), (cascade, 0)):
@@ -248,8 +248,11 @@ def test_linear_cases_are_on_a_flank() -> None:
 
 
 def described(stage: Stage, harmonics: int) -> tuple[float, float]:
-    """Amplitude of the load [m] and period [s] by the describing function of the play: the odd harmonics of the
-    deflection that balance those of the force on the flanks, where the damper acts beside the spring."""
+    """Return amplitude of the load [m] and period [s] by the describing function of the play.
+
+    The odd harmonics of the deflection balance those of the force on the flanks, where the damper acts beside the
+    spring.
+    """
     flat, (k_p, tau_z, tau_i, tau_p) = stage.flat(), numbers(stage.flat()).values()
     load, motor, half = flat["masses.stage"], flat["transmission.mass"], flat["transmission.backlash"] / 2
     a = np.zeros((6, 6))
@@ -292,8 +295,10 @@ def described(stage: Stage, harmonics: int) -> tuple[float, float]:
 
 
 def test_an_integrator_across_a_backlash_hunts_without_friction(backlash_alone: Stage) -> None:
-    """A cycle without any friction: by shooting, by a long simulation, and by the describing function of its first
-    harmonics; that of the first alone is an approximation."""
+    """Shooting, long simulation and the describing function of its harmonics find the same cycle.
+
+    The describing function of the first harmonic alone is an approximation.
+    """
     assert not cannot_hunt(backlash_alone)
     assert not unstable(backlash_alone)
     (cycle,) = hunting(backlash_alone).attracting
@@ -314,7 +319,7 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
 
 @pytest.mark.inner
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, wording: Wording) -> None:
-    """All motions shrink with it, so that no small share of it ends them."""
+    """All motions shrink in proportion to the backlash, so no small share of it ends them."""
     result = feeding(backlash_alone)
     assert result is not None
     assert (result.friction, result.backlash.needed, result.backlash.gone) == (None, True, 0.0)
@@ -324,8 +329,10 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, 
 @pytest.mark.inner
 @pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
 def test_what_feeds_it_is_computed(share: float, certain: bool) -> None:
-    """A belt with play and little friction: without friction it swings on, with less play it rests, unless that is so
-    little that swings may be smaller than is looked for."""
+    """A belt with backlash and little friction still swings without friction, and rests with less backlash.
+
+    If the backlash is so small that swings may be below the search's resolution, the answer is not certain.
+    """
     keys = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
     little = {**LUGRE, "static": "3 N", "coulomb": "2 N"}
     with CheckSettings(feeding_shares=(share,)).in_use():

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 
 
 def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
-    """All cells checked: the share that survives is that of two sweeps compared."""
+    """With all cells verified, the surviving share is that of two complete sweeps compared."""
     axes = {"controller.crossover": "2 Hz..8 Hz:12", "joint.stroke": "0.1 mm..1 mm:12"}
     runs = sweep(rig, axes, rtol=1e-2, verify=1.0)
     tighter = sweep(rig, axes, rtol=1e-4)
@@ -199,7 +199,7 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
     missed = distance_transform_edt(~boundary(a))[boundary(b)]
     assert np.mean(missed < 1) > 0.85
     assert missed.max() < 60
-    assert not (boundary(a) & ~boundary(b)).any()  # what is found is there
+    assert not (boundary(a) & ~boundary(b)).any()  # the boundary that is found is a true one
 
 
 def test_what_cannot_be_refined_is_refused(rig: Stage, refused: Refused) -> None:

@@ -34,7 +34,7 @@ END = 1000.0
 
 
 def word(times: np.ndarray, sizes: np.ndarray, patient: bool = False) -> str:
-    """Of a run that turns at times [s] by so much to either side in turn."""
+    """Return the verdict on a run that turns at `times` [s], by `sizes` to either side in turn."""
     values = sizes * (-1.0) ** np.arange(len(sizes))
     late = values[times >= 0.75 * END]
     return judge(legs(times, values, END), float(np.ptp(late)) if late.size else 0.0, 1e-3, patient)
@@ -144,13 +144,16 @@ SWINGING = np.array([SWINGS, SWINGS, SWINGS, RESTS, SWINGS], dtype=object)
 
 @cache
 def attracting() -> Any:
-    """What attracts a stage, as friso tells it."""
+    """Return the stable motion of a stage as friso finds it."""
     (motion,) = find_swings(HUNTING.flat())
     return motion
 
 
 class Narrow(Bench):
-    """A stage whose `swing` is the share of the distance of what attracts it from within which alone it swings on."""
+    """A stage that keeps swinging only if it begins close enough to its stable motion.
+
+    `swing`: largest distance to that motion, as a share of it.
+    """
 
     def follow(self, trial: Any, *args: Any, **options: Any) -> Any:
         distance = trial.states[:, self.kernel.position] / attracting().distance
@@ -194,7 +197,7 @@ def test_what_was_found_before_an_attack_is_given_up_counts() -> None:
 
 
 def test_stages_are_counted_by_class_of_machine() -> None:
-    """By law, joint and controller, by settings, backlash, and friction on both sides of a transmission."""
+    """Classes are law, joint and controller, settings, backlash, and friction on both sides of a transmission."""
     names = {name for series in SERIES for number in range(30) for name in classes_of(draw(7, number, series).flat())}
     settings = {
         "dead band of the error",
@@ -212,7 +215,7 @@ def test_stages_are_counted_by_class_of_machine() -> None:
 
 
 def outcome(number: int, wrong: bool = False) -> dict[str, Any]:
-    """What an attack on a stage might end in."""
+    """Return an invented outcome of an attack on a stage."""
     ends_as = {"verdict": WRONG if wrong else STOOD, "edge": GIVEN_UP}
     classes = ["joint: free"] if number % 2 else ["joint: rigid", "backlash"]
     claim = {"says": "given: hunts", "case": "given", "classes": classes, "verdict": "hunts", "sure": True, "edge": 1.1}

@@ -90,7 +90,7 @@ TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=
 
 
 def unmet_goals(confirmation: Any, measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """All parts of the goal that a stage misses, or may miss."""
+    """Return all parts of the goal that a stage misses or may miss."""
     return (*unsettled_parts(confirmation, measured, goal), *missed_parts(measured, goal))
 
 
@@ -147,7 +147,7 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
 
 
 def moved_there(stage: Stage, within: float) -> float:
-    """How long a stage that has been moved there takes to settle, before it returns [s]."""
+    """Return how long a stage takes to settle after its first move, before it returns [s]."""
     trace = simulate(stage, 1e-6, 1e-4)
     time, off = np.asarray(trace["time"]), np.asarray(trace["position"] - trace["reference"])
     flat = stage.flat()
@@ -200,7 +200,7 @@ def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
 
 
 def test_friction_of_any_law_counts() -> None:
-    """That of a law from outside friso, and that of a motor alone, which holds no cart against a joint."""
+    """Friction counts under a law from outside friso, and on a motor alone, where it holds no cart at a joint."""
     own = variant(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
     assert breakaway(own.flat()) == least_breakaway(own.flat()) == pytest.approx(2.82)
     assert sliding(own.flat()) == pytest.approx(0.4 * 2.82)
@@ -277,7 +277,7 @@ def test_bandwidth_and_margin_are_those_of_the_gains_at_standstill_too(
 
 
 def crossing(loop: Callable[[complex], complex], low: float, high: float) -> float:
-    """Where the gain of a loop is 1 between two frequencies [Hz]."""
+    """Return the frequency between two others at which the gain of a loop is 1 [Hz]."""
     root: Any = brentq(lambda hertz: np.log(abs(loop(2j * np.pi * hertz))), low, high, xtol=1e-9)
     return float(root)
 
@@ -311,7 +311,10 @@ def observed(s: complex) -> complex:
 def test_the_bandwidth_is_where_the_loop_last_crosses_0_db(
     controller: dict[str, Any], force: Callable[[complex], complex], free: bool, between: tuple[float, float]
 ) -> None:
-    """By transfer functions written by hand, whatever the key of the controller says: 8.08, 24.75 and 8.21 Hz."""
+    """Transfer functions written by hand are the reference: 8.08, 24.75 and 8.21 Hz.
+
+    The controller's own key may state another value.
+    """
     rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
     stage = Stage(**{**rig.as_written(), "controller": controller}) if controller else rig
     flat = stage.flat()
@@ -339,7 +342,7 @@ def test_a_light_mode_that_rises_above_0_db_is_where_the_loop_last_crosses_it(ri
 
 @pytest.mark.parametrize("free", [False, True])
 def test_a_search_tries_the_bandwidth_at_its_limit(free: bool, machines: Fleet) -> None:
-    """Also where it does not go with the key of the controller."""
+    """The limit is tried even if the bandwidth is not proportional to the controller's key."""
     rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
     stage = Stage(**{**rig.as_written(), "controller": {"kind": "adrc", "bandwidth": "3 Hz"}})
     goal = Goal(bandwidth_limit=40.0)
@@ -358,7 +361,7 @@ def test_bandwidths_of_many_points_are_those_of_each(rigid: Stage, kind: str) ->
 
 @pytest.mark.parametrize("kind", [*CONTROLLERS])
 def test_other_structures_are_stages(rigid: Stage, kind: str) -> None:
-    """Each differs from what there is, and the thesis's rules have the gains of Eq. 7."""
+    """Each structure differs from the present one, and the thesis's rules have the gains of Eq. 7."""
     stage = Stage(**{**rigid.as_written(), "controller": CONTROLLERS[kind]})
     listed = controller_of(stage.flat()).structures(stage.flat())
     tried = [remedy for remedy in remedies(stage, Goal(joint=False)) if remedy.name in listed]
@@ -385,7 +388,7 @@ def test_changes_are_compared_by_what_is_bought_then_by_keys_then_by_factors(rig
 
 
 def test_the_least_change_leaves_keys_as_they_are(rigid: Stage) -> None:
-    """From settings in which three keys are changed: numbers next to the present ones are those exactly."""
+    """Starting from settings with three changed keys, numbers near the present ones become exactly those."""
     tuned = rigid.replace({"controller.crossover": "20 Hz", "controller.alpha": 0.2, "controller.beta": 3})
     remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
     assert remedy is not None
@@ -430,7 +433,7 @@ def test_the_least_change_is_sought_among_the_fewest_keys(
 
 
 def test_more_work_than_was_counted_is_no_more_than_all_of_it() -> None:
-    """Of a remedy, too: the next one goes on from where it should have ended."""
+    """Work beyond the count also ends within one remedy: the next one continues from where that should have ended."""
     steps: list[tuple[int, int]] = []
     report = method._Report(lambda done, total, label: steps.append((done, total)), 10)
     for share in (2, 3, 50):
@@ -444,7 +447,7 @@ def test_more_work_than_was_counted_is_no_more_than_all_of_it() -> None:
 
 
 def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
-    """What became of a remedy that works, without what was measured."""
+    """Return the outcome of a remedy that works, without measurements."""
     return RemedyOutcome(remedy, tuned, None, None, ())
 
 
@@ -454,7 +457,7 @@ def changed(before: Stage, after: Stage) -> list[str]:
 
 
 def test_the_answer_does_not_hunt(tuning: Advice) -> None:
-    """By its verdicts, and by what friso check says of it and of its edge, a fifth of the bandwidth away at least."""
+    """The answer's verdicts say so, and so does `friso check`; the edge is at least a fifth of the bandwidth away."""
     (result,) = tuning.working
     confirmation = result.confirmation
     assert result.stage is not None
@@ -488,9 +491,12 @@ def test_what_does_not_change_is_as_before(tuning: Advice) -> None:
 
 
 def test_the_stiffness_under_load_is_that_of_the_loop(rigid: Stage) -> None:
-    """Before the integral acts a controller is nowhere softer; that of van Dijk's rules was told to be, by 1/beta. What
-    carries the load is the stage, with actuator and sensor: of a free joint nothing was to be lost. At standstill the
-    gains are those of standstill, and behind a motor's encoder there is its transmission."""
+    """Before the integral acts, a controller is nowhere softer.
+
+    The stiffness of van Dijk's rules was stated too small, by 1/beta, and a free joint was said to cost nothing,
+    although the load acts on the stage, with actuator and sensor. At standstill the gains of standstill count, and
+    behind a motor's encoder the transmission does.
+    """
     cascade, screw = load(EXAMPLES / "twincat_cascade.toml"), load(EXAMPLES / "ball_screw_axis.toml")
     for stage in (rigid, cascade):
         flat = stage.flat()
@@ -511,7 +517,7 @@ def test_it_is_said_for_what_the_drive_of_the_file_counts(tuning: Advice) -> Non
 
 
 def test_it_is_said_where_the_search_for_a_smaller_change_was_given_up(tuning: Advice) -> None:
-    """With elements of friction, three keys were told as the least change."""
+    """With elements of friction, a change of three keys was stated as the least change."""
     ended = replace(tuning, interrupted=False, outcomes=tuning.working)
     assert answer(ended)[0].startswith("The least change that works: set")
     less = replace(tuning.working[0].remedy, name=f"gains{LEAST}")
@@ -521,7 +527,7 @@ def test_it_is_said_where_the_search_for_a_smaller_change_was_given_up(tuning: A
 
 
 def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning: Advice) -> None:
-    """Of no machine it is known that nothing attracts it: not that it is attracted."""
+    """For every machine it is unknown whether a limit cycle attracts it, which does not mean that one does."""
     dithered = rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}})
     outcome = RemedyOutcome(Remedy.settled_on("dither", dithered), dithered, tuning.present, None, ("hunting",))
     advice = replace(tuning, outcomes=(*tuning.outcomes, outcome))
@@ -535,7 +541,7 @@ def test_of_a_dither_it_is_said_that_no_cycle_can_verify_it(rigid: Stage, tuning
 def test_looking_further_ends_where_it_takes_too_much_work(
     rigid: Stage, machines: Fleet, goal: Goal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What attracts a ball screw took minutes with each batch of points. Those looked at so far are taken."""
+    """Surveys of a ball screw took minutes per batch of points. The points looked at so far are used."""
     search = Search(AS_IS(rigid), goal, machines, machines, rigid, TINY, lambda label: None)
 
     def points() -> Iterator[np.ndarray]:
@@ -557,7 +563,7 @@ def test_looking_further_ends_where_it_takes_too_much_work(
 
 
 def test_machines_are_left_out_once_too_many_are_attracted(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Surveys of settings that fail took as long as those of settings that work: the share is that of fewer then."""
+    """Surveys of failing settings took as long as those of working ones; the share is then that of fewer machines."""
     surveyed: list[int] = []
 
     def attracted(remedy: Remedy, shares: np.ndarray, some: Fleet, goal: Goal, at_once: bool) -> Attraction:
@@ -615,7 +621,7 @@ def test_its_figures_can_be_drawn(tuning: Advice) -> None:
 
 
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
-    """Not even one with which some moves settle: 11.5 Hz is closer to the edge of 9.75 Hz than wanted."""
+    """Settings with which only some moves settle are none either: 11.5 Hz is too close to the edge of 9.75 Hz."""
     near = rigid.replace({"controller.crossover": "11.5 Hz"})
     measured, confirmation = performance_of(near, tuning.machines, goal, near), confirmed(near, goal)
     assert {"distance", "hunting"} <= {*unmet_goals(confirmation, measured, goal)}
@@ -698,8 +704,10 @@ def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wordin
 
 
 def test_settings_that_were_not_looked_at_leave_it_open(tuning: Advice) -> None:
-    """Of gains some settings met the goal on the machines of the search, and one of 59 had been surveyed: "does not
-    work" was said, and 13 % faster ones do."""
+    """Some gains met the goal on the machines of the search, but only one of 59 had been surveyed.
+
+    "Does not work" was said, although settings that are 13 % faster work.
+    """
     met, missed = TriedPoints(np.zeros((2, 1)), *np.ones((9, 2))), TriedPoints(np.zeros((2, 1)), *np.zeros((9, 2)))
     outcome = RemedyOutcome(Remedy("gains", tuning.stage, ()), None, None, None, ())
     some, none = (failing(replace(tuning, outcomes=(replace(outcome, points=points),)))[0] for points in (met, missed))
@@ -720,7 +728,7 @@ def test_what_another_option_found_is_not_said_not_to_work(tuning: Advice) -> No
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
-    """With a modulus margin of 0.9, that is what has to give."""
+    """For a modulus margin of 0.9, the answer is to relax the margin."""
     goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
     search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
     search.optimise()
@@ -779,7 +787,7 @@ def test_what_was_tuned_for_speed_is_not_called_the_least_change(tuning: Advice)
 
 
 def test_no_limit_of_the_bandwidth_is_relaxed_beyond_reason(rigid: Stage, machines: Fleet) -> None:
-    """A limit of 1630 Hz was told to help where 30 Hz were stated."""
+    """A bandwidth limit of 1630 Hz was said to help where 30 Hz were stated."""
     goal = Goal(bandwidth_limit=1.0, joint=False)
     search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
     search.optimise()
@@ -787,7 +795,7 @@ def test_no_limit_of_the_bandwidth_is_relaxed_beyond_reason(rigid: Stage, machin
 
 
 def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
-    """The stage as it is, is measured on the machines on which what works is."""
+    """The present stage is measured on the same machines as the remedy that works."""
     seed = tuning.seed + RemedySettings.current().unseen_seed
     unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, seed, tuning.goal.moves)
     assert (
@@ -805,7 +813,10 @@ def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
 def test_the_least_change_of_few_keys_is_sought_among_these_alone(
     tuning: Advice, monkeypatch: pytest.MonkeyPatch, crossover: str, taken: bool
 ) -> None:
-    """A search among three keys left one of them as it was; one of the others alone is taken if it changes less."""
+    """A search among three keys left one of them unchanged.
+
+    A change of one of the others alone is taken if it is smaller.
+    """
     (works,) = tuning.working
     alpha = {"controller.alpha": 0.09}
     three = Remedy("gains: the least change", tuning.stage, (of_key("controller.crossover", 1, 50, 8),) * 3)
@@ -834,8 +845,10 @@ def test_no_other_point_is_verified_once_one_took_too_long(
     work: float,
     verified: int,
 ) -> None:
-    """With the heavy loop of a cascade three points took three times as long as what a check may take before it gives
-    up; machines with elements of friction took as long without a check."""
+    """Three points of a cascade's heavy loop took three times as long as a check may take before it gives up.
+
+    Machines with elements of friction took as long without a check.
+    """
     made: Any = [rigid, rigid, tuning.goal, *[None] * 4, TINY, lambda label: None]
     session = _Session(*made, outcomes=[tuning.outcomes[0]])
     unsure = RemedyOutcome(AS_IS(rigid), rigid, tuning.present, confirmed(rigid, tuning.goal), (doubt,))
@@ -909,7 +922,7 @@ def test_a_largest_move_that_the_motion_has_no_time_for_is_refused(rigid: Stage)
     ],
 )
 def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: Any, held: Any) -> None:
-    """Of the moves next to either end, as many as one likes; of fewer than 20 that is not known."""
+    """Any number of misses may lie next to either end of the range of moves; fewer than 20 moves decide nothing."""
     sizes = np.geomspace(1e-5, 1e-1, 102)[1:-1]
     moves = Moves(*(np.where(np.isin(np.arange(100), missed), np.inf, 1.0)[None] for _ in range(3)))
     measured = Performance(moves, np.ones((1, 100)), Attraction.none(100), 1.0, 1.0, np.zeros(0, bool), sizes)
@@ -921,7 +934,7 @@ def test_the_goal_holds_between_the_moves_next_to_which_enough_meet_it(missed: A
 
 
 def test_settings_for_large_moves_alone_are_told_as_that(tuning: Advice) -> None:
-    """Neither refused nor praised: they are no least change, and their file says what they are for."""
+    """Such settings are neither refused nor praised: they are no least change, and their file states their purpose."""
     (works,) = tuning.working
     large = replace(works, moves_from=2e-3)
     advice = replace(tuning, outcomes=(large,), interrupted=False)
@@ -1023,7 +1036,7 @@ DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 
 
 def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
-    """With a force limit below 1 N the library warned of an overflow, on the user's screen."""
+    """With a force limit below 1 N the library's overflow warning appeared on the user's screen."""
     column = np.ones(1)
     points = TriedPoints(
         np.zeros((1, 1)), column, column, column, np.array([np.inf]), column, column, column, column, column
@@ -1033,7 +1046,7 @@ def test_a_force_that_is_not_finite_warns_of_nothing() -> None:
 
 
 def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
-    """One setting settles without the margin, the other has it and does not settle."""
+    """One setting settles without the margin, the other has the margin and does not settle."""
     columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
     columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2, "nearness": [1.0, 0.0]}
     columns |= {"whole": [True, True], "moves_from": [np.inf] * 2}
@@ -1050,8 +1063,10 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
 
 @pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))
 def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machines: Fleet, rigid: Stage) -> None:
-    """Of settings that settle the sooner the lower they are, a range of 6 % anywhere; next to those with which
-    something attracts, none is surveyed."""
+    """Settings settle sooner the lower they are, and a window of 6 % anywhere has no limit cycle.
+
+    Next to settings with a limit cycle none is surveyed.
+    """
     shares = np.linspace(0, 1, 60)
     points = TriedPoints(shares[:, None], 1 + shares, *np.ones((8, 60)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
@@ -1085,8 +1100,10 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
 
 
 def test_points_next_to_one_beyond_the_edge_of_what_works_are_tried(machines: Fleet, rigid: Stage) -> None:
-    """The search had converged where something attracts: the first point without, far from there, was taken as it was,
-    and a brute search found one that settles in 89 % of its time."""
+    """The search had converged to settings with a limit cycle, and took the first point without one, far away.
+
+    A brute-force search found one that settles in 89 % of its time.
+    """
     shares = np.array([0.0, 0.02, 0.04, 0.5, 0.6])
 
     def measured(points: np.ndarray) -> TriedPoints:
@@ -1123,8 +1140,11 @@ def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_al
 
 
 def test_the_least_change_that_meets_the_goal_on_fresh_machines_is_taken(rigid: Stage) -> None:
-    """Its machines let one through far from all others that work, and fresh ones ask for twice as much: then for the
-    least of those that were tried, not for one on the way to the tuned settings. Something smaller the other way is."""
+    """The search's machines accept a point far from all others that work; fresh machines need twice that change.
+
+    Then the least of the tried changes is taken, not one on the way to the tuned settings. A smaller one lies the other
+    way.
+    """
     tuned = rigid.replace({"controller.crossover": "40 Hz"})
     remedy = least_remedy(rigid, tuned, Remedy.settled_on("gains", tuned))
     assert remedy is not None
@@ -1148,7 +1168,7 @@ def test_the_least_change_that_meets_the_goal_on_fresh_machines_is_taken(rigid: 
 
 
 def test_a_change_of_one_key_is_less_than_any_of_two(machines: Fleet, rigid: Stage) -> None:
-    """It is looked for first, to a few per cent, and nothing else is tried where it works."""
+    """A change of one key is searched first, to a few per cent; if it works, nothing else is tried."""
     numbers = {"controller.crossover": "20 Hz", "controller.alpha": 0.2}
     remedy = least_remedy(rigid, rigid.replace(numbers), Remedy.settled_on("gains", rigid.replace(numbers)))
     assert remedy is not None
@@ -1180,8 +1200,10 @@ def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet
 
 
 def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
-    """One between two values of the grid, one that goes on to an end of the range, but for what attracts machines:
-    moves alone told a window of ADRC at the end of which something attracted a third of the machines."""
+    """One window lies between two values of the grid, another reaches an end of the range.
+
+    Moves alone gave a window of ADRC at whose end a third of the machines had a limit cycle.
+    """
     variables = of_key("first", 1.0, np.e), of_key("second", 1.0, np.e)
 
     def measured(shares: np.ndarray, *_: object) -> Any:
@@ -1212,8 +1234,11 @@ def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
 
 @pytest.mark.parametrize("kind", ["van Dijk", *CONTROLLERS])
 def test_every_range_told_contains_its_value_and_lies_in_its_search_range(rigid: Stage, kind: str) -> None:
-    """Of gains that the bandwidth scales as well, ranges were told without that: ki from 397 to 413 kN/(m s) around a
-    tuned 56.5 MN/(m s), and a tau of 62 us below the least tried of 125 us."""
+    """Ranges of gains that the bandwidth scales as well ignored that scaling.
+
+    For a tuned ki of 56.5 MN/(m s) 397 to 413 kN/(m s) was stated, and a tau of 62 us below the lowest tried one of 125
+    us.
+    """
     stage = rigid if kind == "van Dijk" else Stage(**{**rigid.as_written(), "controller": CONTROLLERS[kind]})
     random = np.random.default_rng(5)
     for remedy in remedies(stage, Goal()):
@@ -1245,7 +1270,7 @@ def test_that_there_is_no_window_is_said() -> None:
 
 
 def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
-    """At 8 Hz one settles the stage; at 1 Hz none of those tried does."""
+    """At 8 Hz one isolator settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
     assert tried is not None
     assert none is not None
@@ -1259,7 +1284,7 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -
 
 @pytest.fixture(scope="module")
 def sensitivities(rigid: Stage) -> Sensitivities:
-    """Of the thesis's rig without its joint, along several keys."""
+    """Return the sensitivities of the thesis's rig without its joint, along several keys."""
     return sensitivity(rigid, KEYS, edge=find_margin(rigid, True))
 
 
@@ -1276,7 +1301,7 @@ KEYS = (
 def test_a_cycle_s_derivatives_are_those_of_finite_differences(
     rigid: Stage, sensitivities: Sensitivities, name: str
 ) -> None:
-    """To 1e-6, by closing the cycle of stages that differ a little; through kinks and while it sticks."""
+    """Both agree to 1e-6; the reference closes cycles of slightly changed stages, through kinks and sticking."""
     flat = {**rigid.flat(), **as_tuned(rigid.flat())}
     nearby = Ensemble.held({**flat, name: flat[name] * (1 + STEP * np.array([-2, -1, 1, 2]))}, 4)
     cycles = find_cycles(nearby, rtol=1e-11)
@@ -1312,7 +1337,10 @@ def test_a_margin_s_derivative_is_that_of_margins_nearby(rigid: Stage, sensitivi
 
 
 def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage) -> None:
-    """To 1e-6 of the time, of a move and of a release, whose start depends on keys; jumps are as far as they look."""
+    """Both agree to 1e-6 of the time, for a move and a release, whose start depends on keys.
+
+    Jumps are as far away as stated.
+    """
     released = {"motion": {"kind": "release", "displacement": "2 mm", "duration": "4 s"}}
     for stage in (rigid, rigid.replace(released)):
         settles = stage.replace({"controller.crossover": "20 Hz"})
@@ -1397,7 +1425,7 @@ def test_the_motion_is_taken_as_it_is(rigid: Stage) -> None:
 
 
 def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) -> np.ndarray:
-    """How long some stages take to settle into a band."""
+    """Return how long each stage takes to settle into a band."""
     options = RunOptions(rtol=1e-11, bands=(within, within))
     (runs,) = run_chunks(kernel(shared_structure(flat)), flat, stages, options)
     return settling_of_runs(flat, runs, "inner")
@@ -1409,7 +1437,7 @@ def test_an_unknown_key_has_no_derivative(rigid: Stage) -> None:
 
 
 def test_a_key_that_cannot_be_changed_by_a_share_has_no_derivative(rigid: Stage) -> None:
-    """One that is 0, and one that decides which equations there are and is not in them."""
+    """One key is 0; the other selects the equations and does not appear in them."""
     still = rigid.with_numbers({"friction.viscous": 0.0})
     with pytest.raises(InputError, match="viscous = 0"):
         sensitivity(still, ["friction.static", "friction.viscous"])
@@ -1472,7 +1500,7 @@ def test_a_search_whose_work_ends_before_its_first_point_finds_nothing(rigid: St
 
 
 def test_a_time_that_may_be_never_has_its_lower_end() -> None:
-    """Of a hundred, the interval of the slowest twentieth is from the 90th to the 100th."""
+    """For 100 machines, the interval of the slowest twentieth is from the 90th to the 100th."""
     words = [slowest_time(made_up(100, settling=range(late))[1], Goal()) for late in (0, 1, 6, 11)]
     assert words == ["100 ms", "100 ms (100 ms or longer)", "100 ms or longer, possibly never", "never"]
 
@@ -1521,7 +1549,7 @@ def test_what_works_alone_is_not_tried_together(rigid: Stage, tuning: Advice) ->
 
 
 def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) -> None:
-    """It said "as it is: never (0 %)" of a stage without a limit cycle, 12 % of whose moves crept home too late."""
+    """The answer was "as it is: never (0 %)" for a stage without a limit cycle, 12 % of whose moves were too slow."""
     assert as_it_is(tuning) in answer(tuning)
     assert as_it_is(tuning).startswith("As it is: a limit cycle, and ")
     quiet = check_given(tuning.stage.replace({"controller.crossover": "12 Hz"}))
@@ -1548,7 +1576,7 @@ def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) ->
 def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet_the_goal(
     rigid: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its moves met the goal, and nobody had looked yet at what attracts it."""
+    """The stage's moves met the goal, but no limit cycle had been searched for yet."""
     checks: list[Stage] = []
 
     def interrupted(stage: Stage) -> Any:
@@ -1566,7 +1594,7 @@ def test_a_stage_that_was_not_confirmed_before_the_interrupt_is_not_said_to_meet
 
 
 def test_relaxations_left_for_want_of_work_are_told(rigid: Stage, tuning: Advice) -> None:
-    """With elements of friction they took half of all work."""
+    """With elements of friction, relaxations took half of all work."""
     fleet = draw_fleet(rigid, Correlations(), 3, 1)
     search = Search(remedies(rigid, Goal())[0], Goal(settle=0.02), fleet, fleet, rigid, TINY, lambda label: None)
     search.optimise()
@@ -1579,8 +1607,10 @@ def test_relaxations_left_for_want_of_work_are_told(rigid: Stage, tuning: Advice
 
 
 def test_costs_order_settings() -> None:
-    """What breaks a constraint costs more than what does not, and the more the further it does: where not all machines
-    settle, the more the fewer do."""
+    """A setting that breaks a constraint costs more than one that meets all, and more the further it breaks it.
+
+    If not all machines settle, it costs more the fewer do.
+    """
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "looser": [1.0] * 5, "slower": [1.0] * 5}
     columns |= {"force": [1.0] * 5, "margin": [0.6, 0.6, 0.4, 0.6, 0.6], "bandwidth": [8.0] * 5}
     columns |= {"nearness": [1.0, 1.0, 1.0, 0.75, 0.25], "whole": [True] * 5, "moves_from": [1e-5] * 5}
@@ -1592,7 +1622,7 @@ def test_costs_order_settings() -> None:
 def test_points_given_up_early_are_those_that_no_search_would_have_kept(
     rigid: Stage, goal: Goal, changed: Callable[[np.ndarray], np.ndarray] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same best point by the same way as with all moves of all points, of which more are run."""
+    """The best point and the way to it are the same as with all moves of all points, which needs more runs."""
     fleet = draw_fleet(rigid, Correlations(), TINY.machines, 1)
     best, runs, budget = [], [], replace(TINY, generations=6)
     for bounded in (True, False):
@@ -1627,7 +1657,7 @@ def test_points_given_up_early_are_those_that_no_search_would_have_kept(
 
 
 def test_a_search_goes_on_while_all_points_are_as_bad() -> None:
-    """Where no point of a generation settled, all cost the same, and the search was taken to have converged."""
+    """If no point of a generation settled, all had the same cost, and the search was taken to have converged."""
     counts = []
     for costs in (np.full(10, RemedySettings.current().worst_time), np.full(10, 0.5)):
         tried: list[int] = []
@@ -1655,7 +1685,7 @@ def test_a_motion_that_needs_not_settle_is_refused(rigid: Stage, motion: str) ->
 def test_a_rare_machine_does_not_stand_for_a_twentieth(
     rigid: Stage, monkeypatch: pytest.MonkeyPatch, margins: list[float], kept: list[int]
 ) -> None:
-    """One that is far less robust than all but a few of many is left out, others are not."""
+    """A machine that is far less robust than all but a few is left out; others are not."""
     drawn = draw_fleet(rigid, Correlations(), 3, 1)
 
     def of(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float) -> np.ndarray:

@@ -62,7 +62,7 @@ def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
 
 
 def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
-    """All keys that the rig gives, dimensionless ones as a text."""
+    """All keys of the rig are tried, dimensionless ones as a text."""
     inputs, expected = rig.as_written(), numeric_keys(rig.flat())
     keys = [key for key in expected if key.split(".")[1] in inputs.get(key.split(".")[0], {})]
     assert len(keys) == sum(isinstance(value, float) for value in rig.flat().values())
@@ -132,7 +132,7 @@ def test_a_number_of_leaves_is_certain(refused: Refused) -> None:
 
 
 def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
-    """One value is meant there, or a range that is allowed: not what is known of a machine."""
+    """A specification states one value or an allowed range, not the uncertainty of a machine."""
     from friso.design_method.spec import SpecMachine
 
     with refused("crossover_limit"):
@@ -225,7 +225,10 @@ def test_margins_are_those_written(rig: Stage) -> None:
 
 @pytest.mark.parametrize("value", [-1.0, -0.7, 0.3, 1.0])
 def test_correlations_are_those_of_the_file(rig: Stage, value: float) -> None:
-    """Of two normal keys their own; with a range between, Spearman's is that of the copula, 6/pi asin(rho/2)."""
+    """Two normal keys have the stated correlation; with a uniform range, Spearman's is that of the copula.
+
+    That one is 6/pi asin(rho/2).
+    """
     stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m", static="2.9 N .. 3.1 N")
     drawn = draw(stage, pair(value), 4096, seed=2)
     assert np.corrcoef(drawn.keys[COULOMB], drawn.keys[VISCOUS])[0, 1] == pytest.approx(value, abs=0.01)
@@ -254,7 +257,7 @@ def test_what_reaches_beyond_the_bound_is_cut_off(rig: Stage) -> None:
 
 
 def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
-    """Where 1.8 N to 3 N meet 2 N to 3 N, 0.5 of the area of 1.2 breaks the rule."""
+    """For 1.8 N to 3 N against 2 N to 3 N, an area of 0.5 of 1.2 breaks the rule."""
     drawn = draw(uncertain(rig, coulomb="1.8 N .. 3 N", static="2 N .. 3 N"), Correlations(), 1000, seed=6)
     assert np.all(drawn.keys[COULOMB] <= drawn.keys[STATIC])
     ((why, count),) = drawn.broken.items()

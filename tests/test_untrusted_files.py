@@ -62,7 +62,7 @@ def test_a_table_of_countless_keys_is_refused_at_once() -> None:
 
 @posix
 def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
-    """Nor one that is so long that there is no room for what follows it."""
+    """A name so long that no suffix fits is answered as well."""
     out = tmp_path / os.fsdecode(b"o\xff")
     for name, stem in ((b"r\xffg", "r_g"), ("ä".encode() * 120, "ä" * 75)):
         file = tmp_path / os.fsdecode(name + b".toml")

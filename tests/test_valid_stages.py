@@ -53,7 +53,7 @@ def test_a_joint_of_which_all_is_told_can_be_free() -> None:
 
 
 def test_commands_take_a_joint_that_cannot_be_free() -> None:
-    """They spoke of a joint whose damping is missing, although only a free one needs it."""
+    """Messages named a joint without damping, although only a free joint needs it."""
     stage = locked(("stiffness",))
     verdict = friso.check(stage)
     assert {case.stage.joint.locked for case in verdict.result.values()} == {True}
@@ -77,7 +77,7 @@ def _answered(stage: Stage, ask: Callable[[Stage], Answer]) -> bool:
 
 
 def test_what_is_drawn_from_the_schema_is_taken_as_a_whole(caplog: pytest.LogCaptureFixture) -> None:
-    """No key alone decides, and none is forgotten."""
+    """The stage as a whole is valid, not only each key, and every key occurs."""
     caplog.set_level(logging.ERROR)
     for stage in islice(drawn_stages(random.Random(0)), 40):
         assert friso.loads(stage.to_toml()) == stage

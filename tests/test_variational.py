@@ -28,7 +28,7 @@ from friso.hunting.cycle.shooting import shoot
 from friso.stage import Stage
 
 STEADY = settings(max_examples=40)
-"""The same examples while the code stays the same: a motion that just grazes a kink has no derivative."""
+"""Settings that draw the same examples each time: a motion that only grazes a kink has no derivative."""
 
 FINE = 1e-11
 """Relative tolerance of the runs with their deviations; the runs that are subtracted have a tenth of it."""
@@ -54,8 +54,10 @@ def held(chosen: str | Stage, **changes: float) -> Ensemble:
 
 
 def moving(stages: Ensemble, place: float, speed: float, **others: float) -> np.ndarray:
-    """A state: everything displaced and moving as one, in units of the length and the speed of hunting; the integrator
-    likewise, other states in SI units."""
+    """Return a state in which all masses are displaced and move as one.
+
+    Place, speed and integrator are in units of the length and the rate of hunting, other states in SI units.
+    """
     length, rate = float(stages.length[0]), float(stages.number("rate")[0])
     sizes = {"filtered_error": -place * length, "bristle_deflection": 5e-6 * np.sign(speed), "integral": 0.0}
     sizes |= dict.fromkeys(("position", "cart_position", "parasitic_position"), place * length)
@@ -73,7 +75,7 @@ def flow(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:
 
 
 def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: float) -> np.ndarray:
-    """The same from simulated runs alone."""
+    """Return the derivative of the flow by finite differences of simulated runs."""
     size, scales = start.size, stages.scales[0]
     starts = np.concatenate([start + k * step * np.diag(scales) for k in DIFFERENCES])
     several = stages.take(np.zeros(len(starts), np.int64))
@@ -84,11 +86,10 @@ def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: 
 
 
 def off(stages: Ensemble, start: np.ndarray, time: float, flows: np.ndarray) -> np.ndarray:
-    """By how much each column of a derivative is off, as a share of its norm, or of a tenth where deviations shrink to
-    less.
+    """Return the error of each column of a derivative, relative to its norm or to a tenth if that is larger.
 
-    Each against the step that suits it best: differences suffer from curvature at large steps, and at small ones from
-    the noise of the runs, which is largest where one of them sees a kink once more or less than its neighbours.
+    Each column is compared at its best step: differences suffer from curvature at large steps, and at small ones from
+    the noise of the runs, which is largest where one run meets one kink more or less than its neighbours.
     """
     gaps = [np.linalg.norm(flows - flow_by_differences(stages, start, time, step), axis=0) for step in STEPS]
     return np.min(gaps, axis=0) / np.maximum(np.linalg.norm(flows, axis=0), 0.1)
@@ -136,7 +137,10 @@ CASES = [
 @pytest.mark.inner
 @pytest.mark.parametrize(("name", "time", "crosses"), CASES)
 def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -> None:
-    """Each structure before its first reversal and after several; the parasitic mode rings, no limiter is touched."""
+    """Each structure runs up to its first reversal and past several.
+
+    The parasitic mode rings; no limiter is touched.
+    """
     far = {"joint__stroke": 0.1} if name == FREE_RIG else {}
     stages = held(name, **far)
     start = moving(stages, -0.6, 0.5, integral=0.2)
@@ -148,7 +152,10 @@ def test_flow_with_and_without_reversal(name: str, time: float, crosses: bool) -
 @pytest.mark.xdist_group("gains")
 @pytest.mark.parametrize("time", [0.02, 0.05, 0.1, 0.3, 0.5])
 def test_flow_at_the_force_limit(time: float) -> None:
-    """From 10 mm off, pushed by all of 6 N, the integrator at rest and later running; beyond 0.04 s below the limit."""
+    """The stage starts 10 mm off at the full force of 6 N, with the integrator at rest and later running.
+
+    After 0.04 s the force is below its limit.
+    """
     stages = held(by_gains(8, "6 N"))
     start = moving(stages, -0.01 / float(stages.length[0]), 0.3)
     surfaces = stages.kernel.module.surfaces(start[:, None], 0.0, np.zeros(3), stages.values)
@@ -252,7 +259,7 @@ def test_deviations_follow_the_linearised_equations(name: str) -> None:
 @pytest.mark.xdist_group("rigid")
 @pytest.mark.parametrize("time", [0.03, 2.6])
 def test_a_run_is_the_same_with_deviations_and_without(time: float) -> None:
-    """They have no say in the steps; rounding differs, since what terms share is computed once."""
+    """Deviations do not influence the steps; rounding differs, since common terms are computed once."""
     stages = held(RIGID)
     start = moving(stages, -0.6, 0.5, integral=0.2)
     alone = stages.run(start[None], np.array([time]), FINE)
@@ -277,7 +284,10 @@ class Meeting:
 
 @cache
 def numeric(name: str, kink: Kink | None = None) -> Callable[..., list[float]]:
-    """The surfaces of all kinks of a variant, or the jumps at one, of states, sides and what is held."""
+    """Return a function for the surfaces of all kinks of a variant, or for the jumps of the states at one kink.
+
+    Its arguments are states, sides, held values, time, reference and parameters.
+    """
     _, whole = declared(name)
     symbols = [whole.symbols, [item.beyond for item in whole.kinks], TIME, REFERENCE, whole.parameters]
     surfaces = [entry.surface for entry in whole.kinks]
@@ -306,9 +316,11 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
 
 @pytest.mark.parametrize("name", VARIANTS)
 def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
-    """At v = 0 no friction law's field jumps, nor does a controller's at its limit; that of a limiter with damping
-    does, and that of modes that remember may. What is left for the ends of the band of the anti-windup is zero wherever
-    they are met."""
+    """No friction law's rates jump at v = 0, nor a controller's at its limit.
+
+    Those of a damped limiter do, and those of modes with memory may. The jumps declared at the ends of the
+    anti-windup's band are zero wherever they are met.
+    """
     model, whole = declared(name)
     limiters = {kink for kink in model.kinks if kink.name.startswith("stroke_")}
     jumping = set(whole.jumps) - set(model.switches)

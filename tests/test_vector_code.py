@@ -1,4 +1,4 @@
-"""Straight-line code: what it computes in all lanes, compiled, is what plain Python does lane by lane."""
+"""Straight-line code: compiled, it computes in all lanes what plain Python computes lane by lane."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,7 @@ def of_known_truths(B, share, least):
 
 
 def of_several(B, share, least):
-    """What follows may use what another function returns."""
+    """Assign two results of another function; a function's results may be used afterwards."""
     B[2], B[3] = parted(B[0], least)
 
 

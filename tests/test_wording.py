@@ -1,7 +1,7 @@
-"""What commands say, as it is kept in tests/snapshots: a run of each, its help, a mistake and its page.
+"""What commands say, compared with tests/snapshots: a run of each, its help, a mistake and its page.
 
-Facts are tested elsewhere; what is worded anew is read once and kept by `pytest --refresh-snapshots`. Commands that
-take long are run in their own tests, which keep what these say beside.
+Facts are tested elsewhere; a new wording is read once and kept by `pytest --refresh-snapshots`. Slow commands run in
+their own tests, which keep their texts as well.
 """
 
 import ast
@@ -113,7 +113,7 @@ def _keeps(arguments: str) -> bool:
 
 
 def test_messages_are_those_of_tests_that_there_are() -> None:
-    """None is kept of a test that is gone, and none is missing."""
+    """No message of a removed test is kept, and none is missing."""
     kept = {name.partition("[")[0].partition(" ")[0] for name in read(FOLDER / "messages.txt")}
     result = set()
     for path in TESTS.rglob("test_*.py"):

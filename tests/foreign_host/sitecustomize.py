@@ -1,11 +1,11 @@
-"""Makes this interpreter look to friso like one on another system, which FRISO_FOREIGN_HOST names like `sys.platform`.
+"""Make this interpreter look to friso like one on another system.
 
-Python imports it at its start, in children too, where its folder is in PYTHONPATH. friso's modules get `os`, `signal`,
-`sys` and `ctypes` without the names that the other system lacks; other packages have versions of their own for it, and
-are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; in a folder called read-only
-nothing can be made; what is called busy is used by another program the first times; paths are not longer than 259
-characters; a pipe that nobody reads is an invalid argument; text files are cp1252 with CRLF unless they are opened
-otherwise.
+FRISO_FOREIGN_HOST names the system like `sys.platform`. Python imports this module at its start, also in child
+processes, if its folder is in PYTHONPATH. friso's modules get `os`, `signal`, `sys` and `ctypes` without the names that
+the other system lacks; other packages have versions of their own for it, and are left alone. For Windows, more is
+imitated: open files cannot be renamed, replaced or deleted; in a folder called read-only nothing can be created; a file
+called busy is used by another program at first; paths have at most 259 characters; a pipe without a reader is an
+invalid argument; text files are cp1252 with CRLF unless opened otherwise.
 """
 
 import builtins
@@ -95,7 +95,7 @@ multiprocessing.set_start_method("spawn")
 
 
 def _opened_by():
-    """All files that processes have open, and the folders above them that cannot be renamed for that."""
+    """Return all open files, and the folders above them, which cannot be renamed."""
     for process in filter(str.isdigit, os.listdir("/proc")):
         try:
             numbers = os.listdir(f"/proc/{process}/fd")
@@ -151,7 +151,7 @@ def _deleting(real):
 
 
 class Pipe(io.FileIO):
-    """One that nobody reads is an invalid argument."""
+    """A pipe without a reader, which counts as an invalid argument."""
 
     def write(self, data):
         try:

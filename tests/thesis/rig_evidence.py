@@ -17,7 +17,7 @@ HUNTS, FAILED = 7, -1
 
 
 def rail_runs(peaks: Any, **keys: Any) -> RailRuns:
-    """Runs of so many peaks, which swing by 1 mm in 0.5 s to the end, evenly, unless `keys` otherwise."""
+    """Return invented runs with these peak counts, which swing by 1 mm every 0.5 s to the end unless `keys` differ."""
     counts = np.array(peaks)
     every = {"swing": 1e-3, "period": 0.5, "above": 5e-4, "below": 5e-4, "rising": 0.5}
     every |= {"period_scatter": 0.0, "height_scatter": 0.0, **keys}
@@ -29,13 +29,16 @@ def rail_runs(peaks: Any, **keys: Any) -> RailRuns:
 
 def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
           released: Any = (0, 0, 0, 0), **cycle: Any) -> MovesOnRails:  # fmt: skip
-    """On four rails; releases to one side start nothing, those to the other a `cycle`."""
+    """Return invented moves on four rails; releases to one side start nothing, those to the other a `cycle`."""
     let_go = rail_runs([(0, 0, 0, 0), released], **cycle)
     return MovesOnRails(np.array([8.0, 9.5, 14.3]), rail_runs([first, middle, high]), rail_runs(free), let_go)
 
 
 def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
-    """At each of three strokes rails hunt up to the crossover of this number, at none by -1; or `runs` as given."""
+    """Return invented runs at three strokes; `highest`: number of the highest crossover that hunts, -1 for none.
+
+    Or the runs are given.
+    """
     crossovers = np.array([4.0, 6.0, 8.0])
     hunts = np.arange(3) <= np.array(highest)[:, None] if runs is None else np.array([])
     peaks = np.repeat(HUNTS * hunts[..., None], 2, axis=2) if runs is None else np.array(runs)

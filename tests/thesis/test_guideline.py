@@ -1,4 +1,4 @@
-"""The guideline: its groups leave hunting as it is, its edges are the known ones, its laws find what made the data."""
+"""The guideline: its groups preserve hunting, its edges are the known ones, and its laws recover invented ones."""
 
 import json
 import re
@@ -80,7 +80,10 @@ def with_mode(flat: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     "flat", [plain_rig(), plain_rig("joint"), plain_rig("joint") | {"parasitic.frequency": 300.0}], ids=len
 )
 def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, Any]) -> None:
-    """As many groups as parameters less the rank of their dimensions, none with a dimension, none made of others."""
+    """The number of groups is the number of parameters less the rank of their dimensions.
+
+    None has a dimension, and none is a product of others.
+    """
     if "parasitic.frequency" in flat:
         flat |= {"parasitic.mass": 0.25, "parasitic.damping_ratio": 0.01}
     names = group_parameters(flat)
@@ -123,7 +126,7 @@ def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: flo
 
 @FREE_RIG
 def test_equal_groups_equal_multiplier_with_a_free_joint() -> None:
-    """Those of the parasitic mode as well, which `flat_of` leaves out."""
+    """The groups of the parasitic mode, which `flat_of` leaves out, do so as well."""
     values = values_of(free_rig().replace({"controller.crossover": "3 Hz"}).flat())
     plain, scaled = (multiplier(with_mode(flat_of(values, scale), values)) for scale in (UNSCALED, SCALED))
     assert scaled == pytest.approx(plain, rel=1e-3)
@@ -148,7 +151,7 @@ def edge_of(chosen: Stage, low: float, high: float, points: int) -> Edges:
 
 @RIGID
 def test_edge_of_the_rigid_mass() -> None:
-    """9.77 Hz (references.md), where it flips; and what is said where the grid does not hold it."""
+    """The edge is a flip at 9.77 Hz (references.md); an edge outside the grid is reported as such."""
     edge = edge_of(rigid(), 5, 20, 6)
     assert edge.crossover[0] == pytest.approx(9.770, abs=2e-3)
     assert edge.kind[0] == FLIP
@@ -299,7 +302,7 @@ def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
 
 
 def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
-    """Worked steps of invented computed edges: `edge` gives that of the flat keys of the rig."""
+    """Return worked steps with invented edges; `edge`: function of the rig's flat keys."""
     flat = plain_rig("joint")
     studies = {
         name: tuple(worked.ThesisCase(change, 9.0, edge(name, flat | dict(change)), kind) for change in changes)
@@ -339,7 +342,7 @@ def test_claims_hold_differ_or_are_unknown() -> None:
 
 
 def test_edges_below_the_grid_are_good_ones() -> None:
-    """They are neither unknown nor the worst."""
+    """An edge below the grid is neither unknown nor the worst."""
     below = worked.ThesisCase({}, 2.0, np.nan, BELOW)
     design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, 3.0)), 0.5)
     assert (design.worst, design.does) == (3.0, True)
@@ -370,7 +373,7 @@ def test_range_of_crossovers_is_that_about_the_own_one() -> None:
 
 @pytest.fixture(scope="module")
 def quick() -> compute.Guideline:
-    """A guideline of invented sweeps and a shortened rig: what is shown, not what is found."""
+    """Return a guideline of invented sweeps and a shortened rig, to test what is shown."""
     patch = pytest.MonkeyPatch()
     patch.setattr(sweeps, "find_edges", invented)
     patch.setattr(
@@ -428,7 +431,10 @@ def test_guideline_counts_what_it_leaves_out(quick: compute.Guideline) -> None:
 
 
 def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline) -> None:
-    """At 300 Hz: damped a little it does no harm with the joint locked; hardly damped it has to be 15 times above."""
+    """A mode at 300 Hz with little damping does no harm with a locked joint.
+
+    With hardly any damping it has to be 15 times above the crossover.
+    """
     damped, light = quick.parasitic
     assert [(item.frequency, item.damping_ratio) for item in (damped, light)] == [(300, 0.01), (300, 0.001)]
     assert damped.locked is not None

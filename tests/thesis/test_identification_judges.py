@@ -1,4 +1,4 @@
-"""The thesis's experiments of identification: what is judged of its rig, and of rigs made to judge otherwise."""
+"""The thesis's identification experiments: verdicts on its rig, and on rigs changed to get other verdicts."""
 
 import re
 from dataclasses import replace
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.xdist_group("identify-experiments")
 
 
 def judged(claim: str) -> Finding:
-    """The judge's finding from what it needs of the experiments, and no other."""
+    """Return the judge's finding from the experiments that the claim needs, and no others."""
     stage, entry = thesis_rig(), registered()[claim]
     return entry.judge(Evidence({}, {}, analysed(stage), Experiments(stage)))
 

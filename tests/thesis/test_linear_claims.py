@@ -1,4 +1,4 @@
-"""The claims of the thesis that linear analysis decides: what is found of the rig, and rigs made to judge otherwise."""
+"""The claims of the thesis that linear analysis decides: verdicts on the rig, and on rigs changed to get others."""
 
 import re
 from collections.abc import Mapping
@@ -169,7 +169,7 @@ def test_bristles_in_steady_state_are_the_family() -> None:
 
 @pytest.mark.parametrize("joint", ["free", "locked"])
 def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
-    """It is stable just below the delay of a setting and the crossover of a delay, and not just above."""
+    """The rig is stable just below the delay or the crossover of the edge, and unstable just above."""
     loops = linear.locked if joint == "locked" else linear.free
 
     def rightmost(crossover: float, delay: float) -> float:

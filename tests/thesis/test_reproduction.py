@@ -146,7 +146,7 @@ def made_rig() -> Iterator[None]:
         TRACES: traces(),
     }
     runs = {name: lambda stage, mechanism=item: mechanism for name, item in {**made, STANDSTILL: standstill()}.items()}
-    experiments._experiment.cache_clear()  # what is made up is kept like any evidence, here and after this file
+    experiments._experiment.cache_clear()  # invented results are cached like real ones, here and after this file
     with patched({experiments: {"_RUNS": {**_RUNS, **runs}}}):
         yield
     experiments._experiment.cache_clear()
@@ -154,8 +154,10 @@ def made_rig() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def thorough_study() -> Reproduction:
-    """Everything, on maps of 5 x 5 cells, with two joint draws of as many: what it judges means little, but all of it
-    is there."""
+    """Return a complete reproduction on maps of 5 x 5 cells, with two joint draws of equal size.
+
+    Its verdicts mean little, but every part is there.
+    """
     with patched(
         {import_module("friso_thesis.studies.thesis.plausible"): {"POINTS": 5, "EVERY": 9}, REPRODUCE: {"JUDGED": 5}}
     ):
@@ -196,7 +198,7 @@ def test_the_packaged_rig_is_the_example() -> None:
 
 
 def test_the_rig_as_built_is_the_example() -> None:
-    """Its rails are those of `friso rig`, whose shares of rails are therefore the page's."""
+    """The real rig has the rails of `friso rig`, so their shares are those on the page."""
     assert rig_with_drive(thesis_rig()).flat() == friso.load(ROOT / "examples" / "thesis_drive.toml").flat()
 
 
@@ -256,7 +258,7 @@ def test_every_open_value_has_a_range_with_a_reason(value: OpenValue) -> None:
 
 
 def test_joint_draws_are_stages_that_change_everything_at_once() -> None:
-    """They are the same however many are made, and within the ranges; friso's own choice is the rig."""
+    """The draws do not depend on their number and are within the ranges; friso's own choice is the rig."""
     rig = thesis_rig()
     flat, own = rig.flat(), rig.replace(baseline().changes).flat()
     assert {key: value for key, value in own.items() if isinstance(value, float)} == pytest.approx(
@@ -447,7 +449,7 @@ def test_a_limit_is_lower_by_more_than_what_is_the_same() -> None:
 
 
 def test_f14b_names_the_stripe_and_its_dampings() -> None:
-    """A band of longer strokes that keeps moving, above strokes at which the stage comes to rest, is told apart."""
+    """A band of longer strokes that keeps moving, above strokes at which the stage rests, is reported separately."""
     striped = made("isolator-damping", lambda d, s: 6 * ((s < 1e-4) | ((d > 50) & (s > 2e-4) & (s < 4e-4))))
     judge = registered()["F14B"].judge
     part = judge(Evidence({"isolator-damping": striped}, {"locked": cell()})).parts[0]
@@ -459,7 +461,10 @@ def test_f14b_names_the_stripe_and_its_dampings() -> None:
 
 
 def test_f21_tells_how_the_force_itself_oscillates(thorough_study: Reproduction) -> None:
-    """Not its mean at each place, in which an oscillation that does not repeat is averaged away."""
+    """F21 states the force's own oscillation.
+
+    In the mean at each place, oscillations that do not repeat average out.
+    """
     assert thorough_study.experiments is not None
     for run in thorough_study.experiments.constant_speed:
         for part, swing in zip(run.log.segments, force_swings(run), strict=True):
@@ -492,7 +497,7 @@ def test_a_verdict_that_another_reading_turns_says_so() -> None:
 
 
 def test_every_word_is_read_otherwise() -> None:
-    """Each by itself, to either side."""
+    """Each word is changed by itself, in both directions."""
     for word in fields(OWN):
         own = getattr(OWN, word.name)
         others = [other for other in OTHERWISE.values() if getattr(other, word.name) != own]
@@ -503,7 +508,7 @@ def test_every_word_is_read_otherwise() -> None:
 
 @pytest.mark.parametrize("claim", ["F5", "F14B", "F16A"])
 def test_only_words_that_a_judge_reads_are_read_otherwise(claim: str) -> None:
-    """Other readings of those that it does not read change nothing of what it finds."""
+    """A changed reading of a word that a judge does not use does not change its finding."""
     judge, evidence = registered()[claim].judge, Evidence(*HOLDS[claim])
     with words_read() as words:
         own = judge(evidence)
@@ -704,7 +709,7 @@ def test_the_conclusions_under_each_law_are_of_the_claims_asked_for() -> None:
 
 
 def test_claims_asked_for_have_a_page_of_their_own() -> None:
-    """As the whole page has all of them (`test_document_and_page_have_every_claim`)."""
+    """The page has all claims asked for. The whole page: `test_document_and_page_have_every_claim`."""
     asked = reproduce(only=["E1", "S35"], points=3, with_cycles=False, draws=0)
     judged = {entry["id"] for entry in reproduce_document(asked)["claims"] if entry["parts"]}
     assert judged == {"E1", "S35"}
@@ -791,7 +796,10 @@ def test_lasting_hunting() -> None:
 
 
 def test_runs_read_by_what_attracts() -> None:
-    """Where it is not certain the cell is left out; how often a cycle goes round is known where a move ended in it."""
+    """A cell with an uncertain attractor is left out.
+
+    The frequency of a cycle is known if a move ended in it.
+    """
     runs = by_peak_count(
         xr.Dataset(
             {
@@ -810,7 +818,7 @@ def test_runs_read_by_what_attracts() -> None:
 
 
 def test_limits_of_attraction_lie_on_the_curves() -> None:
-    """A limit between two cells is that of the curve that runs between them; without one, it is halfway."""
+    """A limit between two cells lies on the curve between them; without a curve, it lies halfway."""
     runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, 14)
     axes = tuple(runs.dims)
     crossover, mass = (runs[name].values for name in axes)
@@ -850,7 +858,7 @@ def test_wrong_orders_are_refused(orders: dict[str, Any], refused: Refused) -> N
 
 
 def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(tmp_path: Path) -> None:
-    """What was done before the interruption is not computed again, and the verdict is that of a run at one go."""
+    """Evidence from before the interruption is not computed again; the verdict is that of an uninterrupted run."""
     orders: dict[str, Any] = {"only": ["f15b"], "points": 3, "with_cycles": False, "draws": 2}
     kept = Kept(tmp_path / "kept")
 
@@ -896,7 +904,7 @@ def test_few_points_are_shown_and_not_judged_on() -> None:
 
 
 def test_experiments_are_kept_whole(tmp_path: Path) -> None:
-    """Every kind of result comes back as it was made, and a damaged one is made again."""
+    """Every kind of result is read back as it was written, and a damaged one is computed again."""
     kept, experiment = Kept(tmp_path), Experiments(thesis_rig())
     for name in (*EXPERIMENTS, TRACES):
         kind, result = get_type_hints(vars(Experiments)[name].fget)["return"], getattr(experiment, name)
@@ -991,7 +999,7 @@ def test_the_command_writes_its_page_and_claims(
     snapshots: Snapshots,
     undrawn: None,
 ) -> None:
-    """In this process, which keeps the linear analysis of `thorough_study`: it takes longer than all the rest."""
+    """The command runs in this process, which has cached the linear analysis of `thorough_study`, the longest part."""
 
     def run(*arguments: str) -> int:
         monkeypatch.setattr(sys, "argv", ["friso", "reproduce", *arguments])
@@ -1012,7 +1020,7 @@ def test_the_command_writes_its_page_and_claims(
 
 
 def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
-    """No text is cut, leaves the sheet, or runs into the next one."""
+    """No text is cut off, leaves the sheet, or overlaps the next one."""
     space = SimpleNamespace(count=12, draws=48)
     item: Any = SimpleNamespace
     verdicts = [

@@ -26,7 +26,7 @@ def test_what_has_no_joint(refused: Refused) -> None:
 
 
 def test_the_stroke_of_a_free_joint_matters() -> None:
-    """Fig. 26, and what is told of it."""
+    """The result agrees with Fig. 26, and the page says so."""
     sizes = {"CROSSOVERS": np.array([0.5, 1.0]), "STROKES": np.array([0.02, 1.0])}
     with patched({stroke_crossover: {**sizes, "rails": lambda stage: rails(stage)[:2]}}):
         outcome = stroke_crossover.run_experiment(RIG, 1, silent)

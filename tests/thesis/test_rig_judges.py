@@ -1,4 +1,4 @@
-"""The judges of the rig as built (F24 to F28, and what it adds to others) on evidence made to hold and to fail."""
+"""The judges of the real rig (F24 to F28, and its additions to others) on evidence made to hold and to fail."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -33,7 +33,8 @@ MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
         (moves((H, H, 0, 0), middle=(H, 0, 0, 0), released=(0, H, 0, 0)), (Y, Y, Y)),
         (moves((H, 0, 0, 0), released=(0, H, 0, 0)), (Y, Y, Y)),
         (moves((H, 0, 0, 0), middle=(F, 0, 0, 0), released=(H, 0, 0, 0)), (Y, Y, N)),  # what failed did not settle
-        (moves((H, H, H, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, Y, N)),  # no other than those of moves
+        # no stable motion other than those that moves found
+        (moves((H, H, H, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, Y, N)),
         (moves((H, 0, 0, 0), middle=(H, H, H, H), released=(H, H, H, H)), (Y, N, N)),
         (moves((H, 0, 0, 0), middle=(H, 0, 0, 0)), (Y, N, N)),  # no more rails come to rest than at 8 Hz
         (moves((H, H, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, 1), swings=False), (Y, Y, N)),  # dies out
@@ -104,7 +105,7 @@ MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
     "motor, locked": [(loops(), (Y,)), (loops(weak=(2.0, 0.9)), (N,)), (loops(weak=(np.nan, 0.9)), (N,))],
     "motor, free": [(loops(), (Y,)), (loops(weak=(2.4, 0.6)), (N,))],
 }
-"""Evidence by claim, or by what is added to claims, and which parts hold."""
+"""Invented evidence by claim, or by addition to claims, and which parts hold."""
 
 NEEDS = {"F24": MOVES, "F25": MOVES, "F26": GRID, "F27": ON_RAILS, "F28": STANDSTILL}
 

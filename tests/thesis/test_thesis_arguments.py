@@ -26,7 +26,10 @@ Cells = Callable[[np.ndarray, np.ndarray], Any]
 
 
 def made(name: str, peaks: Cells, words: Cells | None = None, swing: Cells | None = None) -> xr.Dataset:
-    """A map of 21 values per axis with so many peaks, whose runs swing where these are counted unless otherwise."""
+    """Return an invented map of 21 values per axis with these peak counts.
+
+    Runs swing where peaks are counted, unless `words` or `swing` say otherwise.
+    """
     spans = STUDIES[name].spans
     x, y = (np.geomspace(s.low, s.high, 21) if s.log else np.linspace(s.low, s.high, 21) for s in spans)
     grid = x[:, None] + 0 * y, 0 * x[:, None] + y

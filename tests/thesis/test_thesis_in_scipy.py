@@ -132,8 +132,11 @@ STILL = {"peaks": np.zeros((2, 2)), "peak_to_peak": np.zeros((2, 2)), "outcome":
 
 
 def test_f5_the_locked_rig_hunts() -> None:
-    """One mass with LuGre friction under the controller of Eq. 7, moved 90 mm there and back: eight seconds after it is
-    back it swings, as friso's locked rig does, which has a stiff contact between its masses besides."""
+    """One mass with LuGre friction under the controller of Eq. 7, moved 90 mm there and back, swings afterwards.
+
+    The mass still swings eight seconds after its return, as friso's locked rig does, which has a stiff contact between
+    its masses.
+    """
     mass = CART + STAGE
     k_p, tau_z, tau_i, tau_p = gains(8.0, mass)
     acceleration, time, back = 100.0, 0.03, 5.0

@@ -1,4 +1,4 @@
-"""Measure standstill with the joint locked and free (thesis, Fig. 28).
+"""Standstill with the joint locked and free (thesis, Fig. 28).
 
 The experiment shows which disturbance moves the stage, and what damping recovers.
 """

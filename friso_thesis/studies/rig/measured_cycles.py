@@ -1,4 +1,4 @@
-"""Simulate hunting cycles as irregular and as slow as the measured ones (thesis, Fig. 27).
+"""Hunting cycles as irregular and as slow as the measured ones (thesis, Fig. 27).
 
 The question is how much friction has to vary for that, and what else makes cycles slow. The thesis gives no numbers for
 the irregularity. Of the period it says that the simulated one is nearly half of the measured one, at a similar

@@ -1,4 +1,4 @@
-"""Find on which fraction of rails peaks are counted, over stroke and crossover (thesis, Fig. 26)."""
+"""Fraction of rails on which peaks are counted, over stroke and crossover (thesis, Fig. 26)."""
 
 from __future__ import annotations
 
