@@ -85,7 +85,7 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 
 @lru_cache
 def _smoothing(order: int, cutoff: float) -> np.ndarray:
-    """Return the sections of a Butterworth filter with a cut-off over half the sampling, designed once."""
+    """Design a Butterworth filter, once, with a cut-off over half the sampling."""
     return butter(order, cutoff, output="sos")
 
 

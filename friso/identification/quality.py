@@ -68,7 +68,7 @@ class Quality:
 
     @property
     def may_imitate_bristles(self) -> bool:
-        """Tell whether the fit leaves more than noise, so that what it lacks may have bent its bristles."""
+        """Tell whether the fit leaves so much that it may have passed for bristles."""
         return self.ratio > DoubtSettings.current().noise_ratio_of_imitated_bristles
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.effects import (
     ExplainedResidual,
@@ -78,10 +78,9 @@ def changing_forces(
     returns the sizes [N] at which they are tried, and the shapes of these lines.
     """
     settings = DoubtSettings.current()
-    way = np.clip(velocity / (settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
     bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
-    forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
+    forces = [base * bend for base in (-way_of(velocity), np.ones(len(velocity))) for bend in bends]
     return forces, [unit] * len(forces), bends
 
 

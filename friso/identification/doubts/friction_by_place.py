@@ -31,7 +31,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     settings = DoubtSettings.current()
     if "friction.coulomb" not in case.fit.problem.names:
         return
-    along = [-column * way_of(case) for column in places_along(case.log["position"][case.log.longest])]
+    along = [-column * way_of(case.velocity) for column in places_along(case.log["position"][case.log.longest])]
     unit = settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
     yield TriedForces(along, [unit] * len(along))
 

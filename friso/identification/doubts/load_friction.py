@@ -37,7 +37,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a force against the motion, in proportion to the motor's force."""
     settings = DoubtSettings.current()
     force = case.log["force"][case.log.longest]
-    against, least = -np.abs(force) * way_of(case), settings.shares_of_a_load[0]
+    against, least = -np.abs(force) * way_of(case.velocity), settings.shares_of_a_load[0]
     yield TriedForces([against], [settings.share_of_a_tried_load], least=least)
 
 

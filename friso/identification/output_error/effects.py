@@ -29,7 +29,7 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last size differs from 0 by more than errors that return with time, place and speed.
+        """Tell whether the last size differs from 0 by more than errors that return.
 
         At the reversals of a slow sine, a coupling or a delay is the same as a friction that differs a little.
         """
@@ -78,10 +78,10 @@ def explained_by(
     return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest), left, every)
 
 
-def is_sure_beside_all(fit: OutputErrorFit, force: np.ndarray, unit: float) -> bool:
-    """Tell whether the size of a further force is sure where all numbers of the model may follow, fitted or not."""
+def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
+    """Tell whether the last size of further forces is sure if all numbers may follow."""
     rest, slopes = beside_all_numbers(fit)
-    explained = explained_by(slopes, rest, effects_of([force], [unit], fit), fit.problem.counted)
+    explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
     return explained is not None and explained.is_sure(fit)
 
 

@@ -262,9 +262,10 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 
 
 def spread_along(problem: Problem, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return the covariance, (p, p), of numbers fitted to a problem with a residual [N], (n,), and slopes, (n, p).
+    """Return the covariance of numbers fitted to a problem, shape (p, p).
 
-    Errors return with time, place and speed, so the many reversals of one sine say no more than one.
+    The residual `rest` [N] has the shape (n,), its derivatives `slopes` (n, p). Errors return with time, place and
+    speed: the many reversals of one sine say no more than a few.
     """
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
