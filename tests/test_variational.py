@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from variants import VARIANTS
 
+import friso
 from friso.engine.arrays import STATISTICS
 from friso.equations.component import TIME, Kink
 from friso.equations.model import REFERENCE, Model, assemble
@@ -345,3 +346,28 @@ def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     assert point.jumps == pytest.approx(
         {"small_velocity": -inputs / 0.25, "small_cart_velocity": inputs / 1.2}, rel=1e-6
     )
+
+
+def test_a_kink_whose_surface_is_level_at_a_trial_point_has_a_jump() -> None:
+    """Two windows and a cascade: the surface of one does not depend there on the symbol that it is linear in."""
+    stage = friso.load(friso.example("thesis_rig")).replace(
+        {
+            "parasitic": None,
+            "friction": {**STRIBECK, "regularisation_velocity": "10 um/s"},
+            "controller": {
+                "kind": "cascade", "kv": "60 1/s", "kp": "500 N*s/m", "position_integral_time": "50 ms",
+                "integral_deadband": "1 um", "standstill_window": "5 um", "standstill_factor": 0.5,
+                "stiction_push": "1 N", "stiction_push_window": "2 um", "force_limit": "200 N",
+                "anti_windup": "back_calculation", "anti_windup_time": "50 ms",
+                "filters": [{"kind": "low_pass", "path": "feedback", "frequency": "1 kHz"}],
+            },
+            "motion": {"kind": "hold", "duration": "20 s"},
+        }
+    )  # fmt: skip
+    assert variational(assemble(structure(stage.flat()))).jumps
+
+
+STRIBECK = {
+    "model": "stribeck", "static": "3 N", "coulomb": "1 N", "stribeck_velocity": "1.6 mm/s", "stribeck_exponent": 2.0,
+    "viscous": "0.5 N*s/m",
+}  # fmt: skip

@@ -101,8 +101,8 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
     """Tell whether a difference is zero everywhere on the surface of a kink.
 
-    It is tested at some points. It counts as not zero if the surface is linear in no symbol; such a surface bounds a
-    window.
+    It is tested at some points. It counts as not zero if the surface is linear in no symbol, like a surface that bounds
+    a window, or level at one of the points.
     """
     if gap == 0:
         return True
@@ -117,7 +117,9 @@ def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
     with mp.workdps(DIGITS):
         for n in range(1, TRIED + 1):
             point = [mp.mpf(int(prime(n + k)) % 97) / (50 + n) + 1 for k in range(1, len(others) + 1)]
-            at = -rest(0, *point) / slope(0, *point)
+            if not (steep := slope(0, *point)):
+                return False
+            at = -rest(0, *point) / steep
             if abs(difference(at, *point)) > NOTHING:
                 return False
     return True
