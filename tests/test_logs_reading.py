@@ -17,7 +17,7 @@ from friso.errors import InputError, LogError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import clipped_share, interpolated, samples_held, unwrapped
-from friso.identification.logs.delays import fitted_lag, force_line, in_blocks, lag
+from friso.identification.logs.delays import force_line, in_blocks, lag
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options
@@ -573,9 +573,6 @@ def test_delay_with_its_interval(true: float) -> None:
     value, half = in_blocks(lambda a, b: lag(one[a:b], two[a:b]), t.size)
     assert abs(value - true) < 2 * half + 0.02
     assert half < 0.3
-    causes = np.stack([two, np.ones_like(two)], axis=1)
-    value, half = in_blocks(lambda a, b: fitted_lag(one[a:b], causes[a:b]), t.size)
-    assert abs(value - true) < 2 * half + 0.02
 
 
 def test_a_body_that_sticks_while_the_force_turns_is_not_late() -> None:

@@ -44,60 +44,40 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
     It is the peak of their cross-correlation, interpolated by a parabola; NaN if its height is below 0.5 or it lies at
     the border of the search.
     """
-    settings = LogSettings.current()
+    longest = LogSettings.current().longest_delay_samples
     first, second = first - first.mean(), second - second.mean()
-    middle = first[settings.longest_delay_samples : -settings.longest_delay_samples]
-    products = np.array(
-        [
-            middle @ second[settings.longest_delay_samples + k : second.size - settings.longest_delay_samples + k]
-            for k in range(-settings.longest_delay_samples, settings.longest_delay_samples + 1)
-        ]
-    )
+    middle = first[longest:-longest]
+    products = np.array([middle @ second[k : second.size - 2 * longest + k] for k in range(2 * longest + 1)])
     norm = np.sqrt((middle @ middle) * (second @ second))
-    return _peak(products / norm, 0.5) if norm > 0 else np.nan
-
-
-def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """Return by how many samples causes, (n, p), lag behind the effect that they add up to.
-
-    It is the lag with the largest fraction explained by least squares, interpolated; NaN if that fraction is below 0.5
-    or the lag lies at the border.
-    """
-    return _peak(_explained(effect, causes), 0.5)
+    return _peak(products / norm) if norm > 0 else np.nan
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     """Return the best-fitting lag; NaN if zero lag fits almost as well."""
     settings = LogSettings.current()
     shares = _explained(effect, causes)
-    return (
-        _peak(shares, 0.5)
-        if 1 - shares.max() < settings.share_left_by_a_delay * (1 - shares[settings.longest_delay_samples])
-        else np.nan
-    )
+    none = 1 - shares[settings.longest_delay_samples]
+    return _peak(shares) if 1 - shares.max() < settings.share_left_by_a_delay * none else np.nan
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
     """Return the fraction of an effect that its causes explain at each lag of the search."""
-    settings = LogSettings.current()
-    middle = (
-        effect[settings.longest_delay_samples : -settings.longest_delay_samples]
-        - effect[settings.longest_delay_samples : -settings.longest_delay_samples].mean()
-    )
+    longest = LogSettings.current().longest_delay_samples
+    middle = effect[longest:-longest] - effect[longest:-longest].mean()
     energy = middle @ middle
     causes = causes / np.maximum(np.abs(causes).max(axis=0), np.finfo(float).tiny)
     shares = []
-    for k in range(-settings.longest_delay_samples, settings.longest_delay_samples + 1):
-        shifted = causes[settings.longest_delay_samples + k : effect.size - settings.longest_delay_samples + k]
+    for k in range(2 * longest + 1):
+        shifted = causes[k : effect.size - 2 * longest + k]
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
         shares.append(float(fit @ (shifted.T @ middle)) / energy if energy > 0 else 0.0)
     return np.array(shares)
 
 
-def _peak(heights: np.ndarray, least: float) -> float:
-    """Return the place of the highest value, by a parabola through three values; NaN if below `least` or at an end."""
+def _peak(heights: np.ndarray) -> float:
+    """Return the place of the highest value, by a parabola through three values; NaN if below 0.5 or at an end."""
     i = int(np.argmax(heights))
-    if heights[i] < least or i in (0, heights.size - 1):
+    if heights[i] < 0.5 or i in (0, heights.size - 1):
         return np.nan
     left, top, right = heights[i - 1 : i + 2]
     curve = left - 2 * top + right

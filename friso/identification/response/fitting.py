@@ -85,7 +85,7 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))
-    except np.linalg.LinAlgError:
+    except (np.linalg.LinAlgError, OverflowError):
         return np.nan
 
 
