@@ -123,6 +123,7 @@ def fake_stage(
     return SimpleNamespace(
         name=name,
         source="made up",
+        note="",
         conditions=None,
         **dict.fromkeys(("drive", "rail", "cable", "floor")),
         joint=joint,

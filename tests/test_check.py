@@ -10,6 +10,7 @@ from variants import VARIANTS
 import friso
 from friso.hunting import check_given
 from friso.hunting.measures import measured_run
+from friso.interface.inputs import stage_of
 from friso.questions.check.question import CheckAnswer
 from friso.stage import Stage
 from friso.studies.sweep import sweep
@@ -231,3 +232,19 @@ def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved()
     time = f"{1e3 * last:.0f} ms"
     assert f"in {time} without breaking away" in answers["15 um"].sentences()[0]
     assert [row[1:] for row in answers["15 um"].tables()[0].rows if "into 10 µm" in row[0]] == [([time],)]
+
+
+def test_what_the_stage_file_notes_is_repeated(rig: Stage, checked: CheckAnswer) -> None:
+    noted = rig.replace({"note": "The controller is a placeholder."})
+    assert noted.to_toml() != rig.to_toml()
+    answer = CheckAnswer(checked.result, stage=friso.loads(noted.to_toml()), draws=None, laws=None, cut=False)
+    assert noted.note in answer.sentences()
+    assert noted.note not in checked.sentences()
+
+
+def test_a_bare_number_is_echoed_with_its_unit(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
+    assert stage_of(rig, ["joint.stiffness=3"]).joint.stiffness == pytest.approx(3e3)
+    assert "3 N/mm" in caplog.text
+    caplog.clear()
+    stage_of(rig, ["joint.stiffness=3 N/mm"])
+    assert not caplog.text

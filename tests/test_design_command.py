@@ -31,7 +31,7 @@ from friso.design_method.method import Design, Frictions, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Position, Spec, load_spec
-from friso.interface.output_folder import MARKER
+from friso.interface.output_folder import MARKER, OutputFolder
 from friso.progress import Progress
 from friso.quantities import outwards
 from friso.questions.design.control import controller_step, moves_step
@@ -99,7 +99,7 @@ def finished(designed: Design) -> Iterator[list[str]]:
     """Let the command find this design; record what it reports of its progress."""
     labels: list[str] = []
 
-    def design(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
+    def design(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
         progress(0, 1, "leaf springs")
         labels.append(stage.name)
         return designed
@@ -135,7 +135,7 @@ def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
 def no_design(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the command find no design, and what to relax."""
 
-    def fail(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
+    def fail(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
         raise NoDesign("no leaf springs meet the specification", RELAXED)
 
     monkeypatch.setattr(method, "design", fail)
@@ -542,7 +542,7 @@ def test_exit_status(
     tmp_path: Path,
     capsys: pytest.CaptureFixture,
 ) -> None:
-    def interrupt(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
+    def interrupt(stage: Stage, spec: Spec, progress: Progress, laws: Frictions, anyway: bool) -> Design:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(method, "design", interrupt)
@@ -571,7 +571,7 @@ def test_a_specification_that_is_not_met_is_told(
     """What exists is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
     less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
-    monkeypatch.setattr(method, "design", lambda stage, spec, progress, laws: less)
+    monkeypatch.setattr(method, "design", lambda stage, spec, progress, laws, anyway: less)
     with pytest.raises(typer.Exit) as left:
         command(RIG, spec, out=folder, as_json=True)
     assert left.value.exit_code == 2
@@ -595,7 +595,7 @@ def test_ctrl_c_keeps_the_leaves_and_the_crossover(
 
     monkeypatch.setattr(method, "design", DESIGN)
     monkeypatch.setattr(method, during, interrupted)
-    answer = friso.design(rig, spec)
+    answer = friso.design(rig, spec, anyway=True)
     assert answer.interrupted
     assert not answer.failure
     assert not answer.meets
@@ -611,3 +611,31 @@ def test_ctrl_c_keeps_the_leaves_and_the_crossover(
     with pytest.raises(KeyboardInterrupt) as nothing:
         method.design(rig, load_spec(spec))
     assert not isinstance(nothing.value, method.DesignInterrupted)
+
+
+def test_a_design_ends_where_no_isolator_is_needed(
+    rig: Stage,
+    spec: Path,
+    small: None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Its leaf springs are not tried, and files of an earlier design beside its own are named."""
+
+    def tried(*_: Any, **__: Any) -> Any:
+        raise AssertionError("the design went on")
+
+    monkeypatch.setattr(method, "design", DESIGN)
+    monkeypatch.setattr(method, "hunting_map", tried)
+    answer = friso.design(rig, spec)
+    assert not answer.result.need.isolator
+    assert (answer.interrupted, answer.failure) == (False, "")
+    assert not answer.document()["interrupted"]
+    folder = OutputFolder("design", tmp_path / "design", False)
+    folder.write({"design.toml": "earlier"})
+    caplog.clear()
+    folder.write(answer.files())
+    assert "design.toml" in caplog.text
+    assert (tmp_path / "design" / "design.toml").read_text() == "earlier"
+    assert friso.load(tmp_path / "design" / "design-not-verified.toml") == answer.stage

@@ -330,3 +330,20 @@ def test_a_folder_that_cannot_be_written(
     status, _, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path)
     tmp_path.chmod(0o700)
     assert (status, "can be written" in text) == (2, True)
+
+
+def test_a_placeholder_for_the_controller_is_noted_in_the_file(inputs: tuple[Path, Path]) -> None:
+    answer = friso.identify(inputs[0], map={"force": "Force"})
+    assert "[controller]" in answer.stage.note
+    assert friso.loads(answer.stage.to_toml()).note in answer.sentences()
+    assert not friso.load(inputs[1]).note
+
+
+def test_a_wrong_controller_is_told(inputs: tuple[Path, Path]) -> None:
+    """The closed loop with a third more crossover is out of step with the log."""
+    right, wrong = (
+        friso.identify(inputs[0], stage=inputs[1], set=changes, map={"force": "Force"}).sentences()
+        for changes in (None, {"controller.crossover": "13.4 Hz"})
+    )
+    assert not any("out of step" in sentence for sentence in right)
+    assert any("out of step" in sentence for sentence in wrong)

@@ -639,3 +639,24 @@ def test_half_of_emps_predicts_the_other(identified: IdentifiedMoves, emps: Log)
     errors = simulated_log(identified, latter).errors
     for name, percent in PUBLISHED.items():
         assert 100 * getattr(errors, name) < percent, name
+
+
+def on_bristles(rate: float, step: float, seconds: float) -> Log:
+    """A sine of some rate [Hz] of a mass whose friction turns over 20 um after each reversal; 20 mN of noise."""
+    time = np.arange(round(seconds / step)) * step
+    omega = 2 * np.pi * rate
+    position, velocity = 0.05 * np.sin(omega * time), 0.05 * omega * np.cos(omega * time)
+    friction, bent = np.empty(len(time)), 0.0
+    for k, speed in enumerate(velocity):
+        bent = (bent + step * speed) / (1 + step * abs(speed) / 2e-5)
+        friction[k] = FRICTION[0] * bent / 2e-5 + FRICTION[1] * speed
+    force = sum(TWO_MASSES) * np.gradient(velocity, step) + friction
+    force += 0.02 * np.random.default_rng(5).standard_normal(len(time))
+    return record("on bristles", step, position=position, force=force)
+
+
+@pytest.mark.parametrize(("rate", "step"), [(0.05, 2e-3), (0.1, 4e-3), (0.2, 2e-3), (0.5, 2e-3)])
+def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupling(rate: float, step: float) -> None:
+    """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
+    case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)
+    assert not "".join(one.words for doubt in (delay, coupling) for one in doubt.find(case))

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import log_files
 import numpy as np
+import pandas as pd
 import pytest
 from inside import friso_inside
 
+import friso
 from friso.identification.contents import log_content
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.interface.output_folder import OutputFolder
@@ -187,3 +189,14 @@ def test_what_of_a_file_is_not_there_is_told(tmp_path: Path) -> None:
     nothing = np.full(1200, np.nan)
     log_files.write_text(tmp_path / "a.csv", ["t", "x", "u", "load"], [M["time"], M["position"], M["force"], nothing])
     assert "left out: column 4 (load)" in friso_inside(tmp_path, "logs", "a.csv").stdout
+
+
+def test_the_command_asks_for_the_constant_of_a_motor(tmp_path: Path) -> None:
+    file = tmp_path / "amperes.csv"
+    time = np.arange(400) * 1e-3
+    columns = {"Time [s]": time, "SetPos [mm]": np.sin(9 * time), "ActPos [mm]": np.sin(9 * time), "Current [A]": time}
+    pd.DataFrame(columns).to_csv(file, index=False)
+    (command,) = friso.logs(file).next_steps([])
+    assert "--scale force=" in command
+    (command,) = friso.logs(file, scale={"force": "35 N/A"}).next_steps([])
+    assert command.count("--scale") == 1

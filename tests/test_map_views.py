@@ -685,9 +685,10 @@ def test_words_samples_and_verdicts_have_their_sentence(snapshots: Snapshots) ->
     text = [headline(runs, "outcome")]
     assert numbers(text[0]) == [50]
     runs["verdict"] = (runs.outcome.dims, [["settles"] * 4, ["settles", "bistable", "hunts", "settles"]])
-    text += [headline(runs, "verdict"), statement(runs, "verdict").splitlines()[-1]]
+    text += [headline(runs, "verdict"), *statement(runs, "verdict").splitlines()[-2:]]
     assert numbers(text[1]) == [12, 11, 12, 6]
     assert numbers(text[2])[-3:] == [1, 1, 6]
+    assert numbers(text[3]) == [1]
     drawn = sampled()
     drawn["outcome"] = (drawn.outcome.dims, np.where(drawn["mass"] < drawn["mass"].median(), "swings", "creeps"))
     text.append(headline(drawn, "outcome"))

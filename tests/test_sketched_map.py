@@ -8,13 +8,14 @@ from friso.equations.bandwidth import faster
 from friso.equations.scaled_friction import with_friction
 from friso.errors import InputError
 from friso.hunting import check, sketch_attractors
-from friso.hunting.criteria import ATTRACTED
+from friso.hunting.criteria import ATTRACTED, SWINGS
 from friso.hunting.return_map.settings import ReturnMapSettings
+from friso.questions.map.data import page_data
 from friso.questions.map.figures import map_figure
-from friso.questions.map.findings import own_place
+from friso.questions.map.findings import caveats, own_place
+from friso.questions.map.page import map_html
 from friso.questions.map.question import SweepAnswer
 from friso.stage import Stage
-from friso.studies.study import study_of
 
 SPEEDS = np.array([0.6, 0.9, 1.0, 1.3, 1.7])
 
@@ -87,10 +88,29 @@ def test_the_edge_lies_between_cells_that_hunt_and_cells_that_do_not(sketched: S
 
 
 def test_the_stage_of_the_file_is_told_with_its_distance_to_the_edge(sketched: SweepAnswer) -> None:
-    (sentence,) = own_place(sketched.data, study_of(sketched.data), "sketch")
+    (sentence,) = own_place(sketched.data, "sketch")
     assert "hunts" in sentence
     assert "1.0 to 1.3" in sentence or "1 to 1.3" in sentence
-    assert not own_place(sketched.data, study_of(sketched.data), "outcome")
+    assert not own_place(sketched.data, "outcome")
+    page = map_html(sketched.data, "sketch", "{indices}")
+    assert sentence.split(";")[0] in page
+
+
+def test_the_page_has_the_edge_of_the_figure(sketched: SweepAnswer) -> None:
+    (curve,) = map_figure(sketched.data, "sketch").panels[0].series
+    x, y = page_data(sketched.data, "sketch", "{indices}")["edge"]
+    assert [value is None for value in x] == [*np.isnan(curve.x)]
+    assert np.nanmax(np.array(y, float)) == pytest.approx(np.nanmax(curve.y), rel=1e-4)
+    assert page_data(sketched.data, "outcome", "{indices}")["edge"] is None
+
+
+def test_a_cycle_longer_than_the_run_is_told(locked: Stage) -> None:
+    runs = friso.sweep(locked, {"controller.crossover": ["0.3 Hz", "2 Hz", "8 Hz"]}, metric="sketch").data
+    hidden = (runs["sketch"].values == "hunts") & (runs["outcome"].values != SWINGS)
+    assert hidden.any()
+    (sentence,) = caveats(runs, "sketch")
+    assert str(hidden.sum()) in sentence
+    assert not caveats(runs.isel({"controller.crossover": [2]}), "sketch")
 
 
 @pytest.mark.inner
@@ -106,13 +126,13 @@ def test_cells_without_a_verdict_are_on_no_side_of_an_edge(locked: Stage) -> Non
     """Static friction below Coulomb friction is no stage: neither curve nor sentence says hunting ends there."""
     runs = friso.sweep(locked, {"friction.static": ["0.5 N", "0.9 N", "3 N", "3.3 N"], "speed": [0.9, 1.0, 1.1]})
     assert not map_figure(runs.data, "sketch").panels[0].series
-    (sentence,) = own_place(runs.data, study_of(runs.data), "sketch")
+    (sentence,) = own_place(runs.data, "sketch")
     assert "ends" not in sentence
 
 
 def test_the_nearest_cell_is_not_called_the_stage(locked: Stage) -> None:
     runs = friso.sweep(locked, {"controller.crossover": ["5 Hz", "9.9 Hz", "14 Hz"]})
-    (sentence,) = own_place(runs.data, study_of(runs.data), "sketch")
+    (sentence,) = own_place(runs.data, "sketch")
     assert "nearest" in sentence
     assert "is transient" in sentence
 

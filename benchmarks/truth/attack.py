@@ -20,8 +20,9 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.stage import Stage
 
 WORK = 4e9
-"""Work of an attack on a claim (see `friso.engine.allowance`), about 50 s on one core: verdict, own motion and edge in
-this order, without SciPy's. Free joints whose limiter chatters would take a hundred times that."""
+"""Work of an attack on a claim (see `friso.engine.allowance`), about 50 s on one core: verdict, own motion, edge and
+margin in static friction in this order, without SciPy's. Free joints whose limiter chatters would take a hundred times
+that."""
 
 STOOD, WRONG, GIVEN_UP = "stood", "wrong", "given up"
 """What becomes of a verdict or an edge that is attacked."""
@@ -66,6 +67,7 @@ def _as_data(claim: Claim) -> dict[str, Any]:
         "sure": claim.sure,
         "edge": claim.edge.factor if claim.edge else None,
         "edge_sure": bool(claim.edge and claim.edge.sure),
+        "friction_sure": None if claim.friction is None else claim.sure and claim.friction.certain,
         "doubts": dict(claim.doubts),
     }
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.engine.allowance import allowance
 from friso.engine.kernel import kernels
-from friso.hunting import Case, CheckPart, Kick, Swinging, check, needed_kernels
+from friso.hunting import Case, CheckPart, Kick, ParameterMargin, Swinging, check, needed_kernels
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -46,8 +46,8 @@ class Claim:
     """The verdict on one case of a stage.
 
     It says whether it is sure, the edge of hunting (None: none was stated), the displacements that start hunting (None:
-    nothing was said), and the survey of attractors (None: no survey). `doubts` says why verdict and edge are not sure,
-    by "verdict" and "edge".
+    nothing was said), the survey of attractors (None: no survey), and the margin in static friction (None: none was
+    stated). `doubts` says why verdict and edge are not sure, by "verdict" and "edge".
     """
 
     case: str
@@ -58,6 +58,7 @@ class Claim:
     kick: Kick | None
     surveyed: Any = None
     doubts: Mapping[str, str] = field(default_factory=dict)
+    friction: ParameterMargin | None = None
 
     @property
     def attracted(self) -> bool:
@@ -121,7 +122,9 @@ def _claim(name: str, case: Case) -> Claim:
     )
     edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet, windows)
     doubts = _doubts(case, sure, edge)
-    return Claim(name, case.stage, verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts)
+    return Claim(
+        name, case.stage, verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts, case.static_friction
+    )
 
 
 def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:

@@ -18,7 +18,8 @@ from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, least_swing
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import CLOSER, FINE, LINGERING, ROUGH, ROUNDS, Bench, Outcome, Trial
 from friso.equations.bandwidth import bandwidth, faster
-from friso.hunting import Kick, Swinging, find_swings
+from friso.equations.scaled_friction import with_static_friction
+from friso.hunting import Kick, ParameterMargin, Swinging, find_swings
 
 ALL = (80, 40, 60, 20)
 """Numbers of releases, pushes, stuck and drawn starts of a whole battery."""
@@ -63,7 +64,10 @@ SCIPY_PERIODS, ALIKE = 20.0, 0.03
 
 @dataclass(frozen=True)
 class Refutation:
-    """Which claim is wrong ("verdict", "own motion", "kicks", "edge"), and by what evidence."""
+    """A refuted claim, and the evidence against it.
+
+    `of` is "verdict", "own motion", "kicks", "edge" or "static friction".
+    """
 
     of: str
     sure: bool
@@ -71,7 +75,10 @@ class Refutation:
 
 
 def attempts(claim: Claim, seed: int) -> dict[str, Iterator[Refutation]]:
-    """Return the attempts against a claim: on its "verdict", and on its "edge" if there is one."""
+    """Return the attempts against a claim: on its "verdict", its "edge" and its margin in "static friction".
+
+    Only what the claim states is attempted.
+    """
     bench, tried = Bench(claim.stage.flat(), claim.swing), dict[str, Iterator[Refutation]]()
     if claim.verdict == "failed" or not bench.length > 0:
         return tried
@@ -81,6 +88,8 @@ def attempts(claim: Claim, seed: int) -> dict[str, Iterator[Refutation]]:
         tried["verdict"] = _hunting(claim, bench, seed)
     if claim.edge is not None:
         tried["edge"] = _edge(claim, claim.edge, seed)
+    if claim.friction is not None:
+        tried["static friction"] = _static_friction(claim, claim.friction, seed)
     return tried
 
 
@@ -259,6 +268,28 @@ def _edge(claim: Claim, edge: Edge, seed: int) -> Iterator[Refutation]:
     if not any(_may_attract_at(at(claim, end * factor)) for factor in (NEAREST, *BELOW)):
         places = ", ".join(f"{factor:g}" for factor in (*BELOW, NEAREST))
         yield Refutation("edge", edge.sure, f"at {places} times the edge no start swings on, nor {NEITHER}")
+
+
+def _static_friction(claim: Claim, margin: ParameterMargin, seed: int) -> Iterator[Refutation]:
+    """Yield factors of static friction at which the stage hunts though it is said not to, or the reverse.
+
+    Both ends of a stated change are tried, and the ends of the range where none is stated.
+    """
+    said = {
+        factor: (attracts, claim.sure and end.certain)
+        for end in (margin.below, margin.above)
+        if end
+        for factor, attracts in ((end.same, margin.attracts), (end.other, not margin.attracts))
+    }
+    ends = {margin.range[side > 0]: (margin.attracts, claim.sure) for side in (-1, 1) if margin.end(side) is None}
+    quiet = {margin.range[side > 0] for side in margin.open_sides} | {1.0}
+    for factor, (hunts, sure) in {factor: of for factor, of in (said | ends).items() if factor not in quiet}.items():
+        flat = with_static_friction(claim.stage.flat(), factor)
+        bench = Bench(flat)
+        if not hunts and (why := swinging(bench, bench.starts(*FEW, seed))):
+            yield Refutation("static friction", sure, f"at {factor:.4g} times its static friction it {why}")
+        if hunts and not _may_hunt(bench, bench.starts(*ALL, seed)) and not _may_attract_at(flat):
+            yield Refutation("static friction", sure, f"at {factor:.4g} times its static friction no start swings on")
 
 
 def _may_attract_at(flat: dict[str, Any]) -> bool:

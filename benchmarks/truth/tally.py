@@ -27,6 +27,10 @@ COLUMNS = {
     "edges_certain": "certain",
     "edges_right": "right",
     "edges_wrong": "wrong",
+    "margins": "margins in static friction",
+    "margins_certain": "certain",
+    "margins_right": "right",
+    "margins_wrong": "wrong",
 }
 """What is counted, and its title. "Right" was not refuted. What is certain and neither right nor wrong was not attacked
 to the end: the attack took too much work, or there was nothing to try (no friction, or a reference that never stands
@@ -57,11 +61,13 @@ def counts(claims: Claims) -> dict[str, int]:
     parts = {
         "verdicts": [claim["outcomes"].get("verdict") for _, claim in claims if claim["sure"]],
         "edges": [claim["outcomes"].get("edge") for _, claim in claims if claim["edge_sure"]],
+        "margins": [claim["outcomes"].get("static friction") for _, claim in claims if claim.get("friction_sure")],
     }
     counted = {
         "stages": len({_name(record) for record, _ in claims}),
         "verdicts": len(claims),
         "edges": sum(claim["edge"] is not None for _, claim in claims),
+        "margins": sum(claim.get("friction_sure") is not None for _, claim in claims),
     }
     for part, certain in parts.items():
         outcomes = {"certain": len(certain), "right": certain.count(STOOD), "wrong": certain.count(WRONG)}
@@ -84,7 +90,8 @@ def print_tally(records: Sequence[Record], tally: dict[str, Any]) -> None:
         print(f"  WRONG: {witness['stage']}, {witness['case']}, {witness['of']}: {witness['why']}")
     _print_doubts(records)
     every, check, attack = tally["all"], tally["check_cpu_s"], tally["attack_cpu_s"]
-    wrong, share = every["verdicts_wrong"] + every["edges_wrong"], every["verdicts_certain"] / max(every["verdicts"], 1)
+    wrong = sum(every[f"{part}_wrong"] for part in ("verdicts", "edges", "margins"))
+    share = every["verdicts_certain"] / max(every["verdicts"], 1)
     print_goals(
         [
             Goal("certain verdicts", "97 %", f"{100 * share:.1f} %", share >= 0.97),

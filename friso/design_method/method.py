@@ -162,10 +162,10 @@ class Design:
 
 @dataclass(frozen=True)
 class UnfinishedDesign:
-    """Design left by an interruption: leaf springs, stroke and crossover, not tried in moves.
+    """Design without its later steps: leaf springs, stroke and crossover, not tried in moves.
 
-    `need` tells whether an isolator is needed; `edges` of hunting with the isolator are None if they were not found
-    yet.
+    It was interrupted, or stopped because no isolator is needed, which `need` tells. `edges` of hunting with the
+    isolator are None if they were not found yet.
     """
 
     spec: Spec
@@ -173,6 +173,7 @@ class UnfinishedDesign:
     need: Need
     fitted: LeavesAndCrossover
     edges: Corners | None
+    interrupted: bool = True
 
     @property
     def stage(self) -> Stage:
@@ -193,11 +194,22 @@ class DesignInterrupted(KeyboardInterrupt):
         self.so_far = so_far
 
 
-def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
+class NotNeeded(Exception):
+    """Raised where no isolator is needed and none was asked for; it holds the design `so_far`."""
+
+    def __init__(self, so_far: UnfinishedDesign) -> None:
+        super().__init__()
+        self.so_far = so_far
+
+
+def design(
+    stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law, anyway: bool = True
+) -> Design:
     """Design leaf springs, stroke and controller of an isolator.
 
     Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
-    NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C.
+    NoDesign if nothing meets the specification, DesignInterrupted at Ctrl-C, and NotNeeded where no isolator is needed,
+    unless one is wanted `anyway`.
     """
     settings = DesignSettings.current()
     base = prepared(stage, spec)
@@ -225,6 +237,8 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     if isinstance(outcome, NoDesign):
         raise outcome.of(need)
     fit, candidates = outcome
+    if not (anyway or need.isolator):
+        raise NotNeeded(UnfinishedDesign(spec, stage, need, fit, None, interrupted=False))
     crossover = fit.stage.flat()[CROSSOVER]
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}

@@ -180,7 +180,7 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
             if turn.per_ampere:
                 ampere = turn.per_ampere * turn.travel / (2 * pi)  # torque of an ampere
                 values += [(at_motor * factor / ampere, f"A{angle}{place}") for angle, factor in per]
-        return values
+        return [*values, *([(value / 1e3, unit.replace("m", "mm"))] if kind == LINEAR else [])]
 
     return others
 

@@ -20,7 +20,6 @@ from friso.engine.overtaken import current_flag, go_on
 from friso.engine.side_by_side import cores_to_use, results_of
 from friso.equations import motion
 from friso.equations.reference import moved_on
-from friso.equations.roles import Steady
 
 LONGEST_SHARE = 1 / 200
 """Longest step over the duration of the run. A longer one could pass over an event."""
@@ -128,12 +127,11 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return initial states at rest, with masses displaced as the motion says.
+    """Return initial states held at rest, with masses displaced as the motion says.
 
     Measurements of the masses are displaced too.
     """
-    displacement = motion.initial_displacement(flat)
-    return kernel.settled({**flat, "motion.size": motion.size(flat)}, Steady(0.0, displacement), runs)
+    return kernel.balanced({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:

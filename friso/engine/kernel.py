@@ -24,7 +24,7 @@ from friso.equations.dragged import Dragged
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
 from friso.equations.roles import Role, Steady
-from friso.equations.structure import Structure
+from friso.equations.structure import Structure, carrying_force
 from friso.stage import Section
 from friso.stage.motion import QUADRATIC
 from friso.stage.plug_ins import plug_ins
@@ -157,21 +157,40 @@ class Kernel:
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
+    def balanced(self, flat: dict[str, Any], displacement: Any, runs: int) -> np.ndarray:
+        """Return the states of stages held at a displacement [m], at rest, (runs, initial_size).
+
+        The actuator carries the constant forces, by the integral of its controller, or by the error without one.
+        """
+        values = self.values(flat, runs)
+        steady = Steady(0.0, displacement, force=carrying_force(flat))
+        return self.settled_at(values, self._with_error(values, steady), runs)
+
+    def _with_error(self, values: list[np.ndarray], steady: Steady) -> Steady:
+        """Return a steady motion with the error at which a controller without an integral exerts its force."""
+        (stiffness,) = self.module.stiffness(values)
+        if not np.any(steady.force) or self.having(Role.INTEGRAL) or not np.all(stiffness):
+            return steady
+        error = steady.force / stiffness
+        return steady._replace(error=steady.error + error, position=steady.position - error)
+
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
         """Return states in a steady motion after all transients, from values of the parameters."""
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion with all integrals 0, from values of the parameters.
+        """Return states in a steady motion with integrals that hold `steady.force` alone, from parameter values.
 
-        The force of the controller follows from the other states.
+        The other states add their own force.
         """
-        resting = self.settled_at(values, steady._replace(force=0.0), runs)
+        resting = self.settled_at(values, self._with_error(values, steady)._replace(force=0.0), runs)
         if integrals := self.having(Role.INTEGRAL):
             per_newton = self.settled_at(values, steady._replace(force=1.0), runs) - resting
             inner = integrals[-1]
             resting -= (resting[:, inner] / per_newton[:, inner])[:, None] * per_newton
             resting[:, integrals] = 0.0
+            if np.any(steady.force):
+                resting += np.reshape(steady.force, (-1, 1)) * per_newton
         return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:

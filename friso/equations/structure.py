@@ -156,6 +156,11 @@ def structure(flat: Mapping[str, Any]) -> Structure:
     )
 
 
+def carrying_force(flat: Mapping[str, Any]) -> Any:
+    """Return the force [N] of the actuator that carries the constant forces of [bias], as of a vertical axis."""
+    return 0.0 - sum(np.asarray(flat.get(f"bias.{name}", 0.0)) for name in ("cart", "stage"))
+
+
 def shared_structure(flat: Mapping[str, Any]) -> Structure:
     """Return the common structure of stages, read from the first of them."""
     return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})

@@ -24,7 +24,10 @@ from friso.identification.output_error.effects import (
     beside_all_numbers,
     effects_of,
     explained_by,
+    explained_by_forces,
+    reaching_over,
 )
+from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 from friso.progress import Progress, silent
@@ -33,6 +36,9 @@ from friso.registry import Registry
 if TYPE_CHECKING:
     from friso.identification.output_error.fit import OutputErrorFit
     from friso.identification.quality import Quality
+
+IMITATED = "what the model lacks would pass for it"
+"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
@@ -110,9 +116,14 @@ class FitCase(FittedCase):
     """
 
     quality: Quality
-    refused: Mapping[str, str] = field(default_factory=dict)
     leading: LeadingEffect | None = None
     progress: Progress = silent
+
+    @property
+    def refused(self) -> dict[str, str]:
+        """Return why keys are not reported, by key; the first of several reasons counts."""
+        last_first = reversed(self.quality.findings)
+        return {key: why for finding in last_first for key, why in finding.refuses.items()}
 
     @property
     def has_cause(self) -> bool:
@@ -127,18 +138,55 @@ class FitCase(FittedCase):
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
-    def is_small(self, size: float) -> bool:
-        """Tell whether a force along the way of some size [N] is too small to be told: intervals allow for it."""
+    @property
+    def describes(self) -> bool:
+        """Tell whether the fit describes the log at all."""
+        return not (self.quality.failed or self.quality.rejected)
+
+    def led_by(self, doubt: str) -> LeadingEffect | None:
+        """Return the leading effect if it is that of a doubt, and the fit describes the log."""
+        return self.leading if self.describes and self.leading is not None and self.leading.doubt == doubt else None
+
+    def explained(
+        self, forces: Callable[[FittedCase], Iterable[TriedForces]]
+    ) -> Iterator[tuple[TriedForces, ExplainedResidual]]:
+        """Yield forces of an effect that explain a part of what a fit of the log leaves."""
+        for tried in forces(self) if self.describes else ():
+            explained = explained_by_forces(self.fit, tried.forces, tried.units)
+            if explained is not None:
+                yield tried, explained
+
+    def reaching(self, moved: np.ndarray, further: Mapping[str, float] | None = None) -> OutputErrorFit:
+        """Return the fit with intervals that reach over the shift by an effect.
+
+        `moved` is the shift, shape (free,); some numbers reach `further`, by name.
+        """
+        reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
+        return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
+
+    def named(
+        self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] | None = None
+    ) -> RaisedDoubt:
+        """Return the finding of the leading effect, by which bristles would seem to bend."""
+        refuses = dict.fromkeys(BRISTLES, IMITATED)
+        wider = self.reaching(effect.explained.moved, further)
+        return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
+
+    def named_along(
+        self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
+    ) -> RaisedDoubt:
+        """Return the finding of a leading effect along the way, unnamed if it is small."""
+        finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
-        return size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
+        small = size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
+        return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
         """Return the case with a finding added, and with the finding's consequences for the fit."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
-        fit, inverse = finding.fit or self.fit, finding.inverse or self.inverse
-        return replace(self, fit=fit, inverse=inverse, quality=quality, refused={**finding.refuses, **self.refused})
+        return replace(self, fit=finding.fit or self.fit, inverse=finding.inverse or self.inverse, quality=quality)
 
 
 @dataclass(frozen=True)
@@ -252,10 +300,9 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
     return [*raised("fault", case), *rivals, *plain, *(() if rivals else raised("otherwise", case))]
 
 
-def way_of(case: FittedCase) -> np.ndarray:
-    """Return the direction of the motion from -1 to 1, shape (n,), gradual where it creeps."""
-    top = DoubtSettings.current().speed_share_of_creeping * np.abs(case.velocity).max()
-    return np.clip(case.velocity / top, -1.0, 1.0)
+def way_of(velocity: np.ndarray) -> np.ndarray:
+    """Return the direction of a motion [m/s], (n,), from -1 to 1, gradual where it creeps."""
+    return np.clip(velocity / (DoubtSettings.current().speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -77,9 +78,15 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
     settings = IdentificationSettings.current()
     if cutoff >= 0.5 / sample_time:
         return position
-    sections = butter(settings.order_of_smoothing, 2 * cutoff * sample_time, output="sos")
+    sections = _smoothing(settings.order_of_smoothing, 2 * cutoff * sample_time)
     edge = min(3 * settings.order_of_smoothing, position.shape[-1] - 1)
     return sosfiltfilt(sections, position, axis=-1, padlen=edge)
+
+
+@lru_cache
+def _smoothing(order: int, cutoff: float) -> np.ndarray:
+    """Design a Butterworth filter, once, with a cut-off over half the sampling."""
+    return butter(order, cutoff, output="sos")
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identification.doubt import KeyCase, RaisedDoubt
-from friso.identification.doubts.coupling import IMITATED
+from friso.identification.doubt import IMITATED, KeyCase, RaisedDoubt
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import BRISTLES, is_free
@@ -41,7 +40,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
         case = replace(case, estimates=estimates, correlation=correlation)
     elif not is_free(case.flat):
         case = case.with_answers(RaisedDoubt(answers=_with_model_error(case)))
-    imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.lacks_something else {}
+    imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
     case = case.with_answers(RaisedDoubt(refuses={**case.refused, **imitated}))
     if is_free(case.flat):
         return case

@@ -67,6 +67,11 @@ class Quality:
         return self.ratio > DoubtSettings.current().noise_ratio_of_a_lacking_model
 
     @property
+    def may_imitate_bristles(self) -> bool:
+        """Tell whether the fit leaves so much that it may have passed for bristles."""
+        return self.ratio > DoubtSettings.current().noise_ratio_of_imitated_bristles
+
+    @property
     def lacking(self) -> float:
         """Return the fraction of the RMS residual that is not noise: 0 for a complete model."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
@@ -111,7 +116,7 @@ def quality_of(
         rejected=rejected,
         failed=poor and plain.whole_error > settings.error_of_a_poor_model,
         without=without,
-        spoilt=unsettled or any(cause.spoils for cause in reasons),
+        spoilt=unsettled or any(one.spoils for one in (*reasons, *findings)),
         unsettled=unsettled,
         seen=seen,
     )

@@ -41,12 +41,12 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
     settings = IdentificationSettings.current()
     return (
         np.arange(len(position)) * settings.blocks_of_time // len(position),
-        _binned(position, settings.bins_of_place_and_speed),
-        2 * _binned(velocity, settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
+        binned(position, settings.bins_of_place_and_speed),
+        2 * binned(velocity, settings.bins_of_place_and_speed) + (velocity * acceleration > 0),
     )
 
 
-def _binned(values: np.ndarray, count: int) -> np.ndarray:
+def binned(values: np.ndarray, count: int) -> np.ndarray:
     """Return the numbers of the bins, of equal width, that hold the values, shape (n,)."""
     edges = np.linspace(values.min(), values.max(), count + 1)[1:-1]
     return np.digitize(values, edges)

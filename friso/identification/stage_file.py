@@ -22,6 +22,11 @@ CHOSEN = "our choice, not identified"
 
 OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 
+PLACEHOLDER = (
+    "The [controller] of the stage file is our choice: put yours there, and delete this note, before you ask whether "
+    "the stage hunts."
+)
+
 
 def made_up(log: Log, inverse: InverseModel) -> Stage:
     """Make up a stage around a log without any.
@@ -64,7 +69,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     }
     if axis != LINEAR:
         tables["axis"] = {"kind": axis.name}
-    return Stage(name=log.name, source=OUR_CHOICE, **tables)
+    return Stage(name=log.name, source=OUR_CHOICE, note=PLACEHOLDER, **tables)
 
 
 def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:

@@ -79,8 +79,12 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
             if not wanted:
                 raise
             return load_changed(Path(source), wanted)
-    typed = changes is not None and not isinstance(changes, Mapping)
-    return stage.replace(stage.in_own_units(wanted) if typed else wanted) if wanted else stage
+    if changes is not None and not isinstance(changes, Mapping):
+        in_units = stage.in_own_units(wanted)
+        for key in (key for key, value in wanted.items() if in_units[key] != value):
+            LOGGER.warning(f"{key}={wanted[key]} is taken as {in_units[key]}")
+        wanted = in_units
+    return stage.replace(wanted) if wanted else stage
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:

@@ -100,6 +100,7 @@ class OutputFolder:
         """
         self.check(files)
         others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
+        earlier = [name for name in self.files if name not in files and os.path.lexists(self.folder / name)]
         contents = {self.folder / name: content for name, content in files.items()}
         own = contents if self.overwrite else [self.folder / name for name in self.files]
         own = [*own, *filter(Path.is_file, beside or ()), *([self.folder / MARKER] if self.is_marked else ())]
@@ -114,6 +115,8 @@ class OutputFolder:
             write(self._marker(names), [self.folder / MARKER])
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
+        if earlier:
+            LOGGER.warning(f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there")
         return written(contents)
 
     def _marker(self, names: Iterable[str]) -> dict[Path, Content]:

@@ -30,7 +30,7 @@ SHARED: Mapping[str, SharedOption] = {
     "set": SharedOption(
         "dict, optional",
         'Keys to override, ``{"joint.locked": True}``.',
-        'Override a key: masses.stage="0.6 kg".',
+        'Override a key: masses.stage="0.6 kg"; a number alone has the unit that the file has there.',
     ),
     "progress": SharedOption("Progress", "Called as work is done, also from worker threads."),
     "rtol": SharedOption("float", "Relative tolerance of the solver, 1e-12 to 1e-2."),

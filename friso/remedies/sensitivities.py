@@ -12,7 +12,6 @@ from friso.engine.arrays import STATISTICS, Results, Status
 from friso.engine.batch import MOST_TURNS
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import initial_displacement, rests, size, stands
-from friso.equations.roles import Steady
 from friso.equations.structure import decisive_keys
 from friso.errors import InputError
 from friso.frequency.crossover import settled_members
@@ -299,9 +298,8 @@ def _is_smooth(
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the states in which stages begin their motion, shape (count, states)."""
-    displaced = Steady(0.0, np.broadcast_to(initial_displacement(flat), (count,)))
     sized = {**flat, "motion.size": size(flat)}
-    return stages.kernel.settled(sized, displaced, count)[:, : len(stages.kernel.states)]
+    return stages.kernel.balanced(sized, initial_displacement(flat), count)[:, : len(stages.kernel.states)]
 
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:

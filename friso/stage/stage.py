@@ -94,6 +94,7 @@ class Stage(Section):
 
     name: str = ""
     source: str = ""
+    note: str = ""
     axis: Annotated[AxisTable | None, Table(lambda _: AxisTable, '[axis] kind = "rotary"')] = None
     masses: Annotated[Masses, Table(lambda _: Masses, '[masses] cart = "1.2 kg"')]
     friction: Annotated[FrictionSection | None, _FRICTION] = None
@@ -152,7 +153,7 @@ class Stage(Section):
         kind = KINDS[self.axis.kind] if self.axis else LINEAR
         return replace(kind, per_ampere=float(self.actuator.motor_constant)) if self.actuator else kind
 
-    @field_validator("name", "source")
+    @field_validator("name", "source", "note")
     @classmethod
     def _can_be_saved(cls, text: str) -> str:
         text.encode()  # raises for half a character, which a command line may contain

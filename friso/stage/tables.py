@@ -185,7 +185,10 @@ class Parasitic(UncertainSection):
 
 
 class Bias(UncertainSection):
-    """Constant forces, as of a cable or of gravity on a tilted rail."""
+    """Constant forces, positive towards larger positions: of a cable, a tilted rail, or the weight of a vertical axis.
+
+    Runs begin with the actuator carrying their sum.
+    """
 
     cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
     stage: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None

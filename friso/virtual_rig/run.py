@@ -15,6 +15,7 @@ from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole
 from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.reference import value
 from friso.equations.roles import Role, Steady
+from friso.equations.structure import carrying_force
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.rig import Floor
@@ -168,7 +169,8 @@ def _recorded(
         budget=int(settings.steps_per_sample * task.duration / np.min(flat["drive.sample_time"])),
     )  # fmt: skip
     pieces = task.pieces.reshape(-1, *task.pieces.shape[-2:])
-    at_rest = Steady(-task.displacement, pieces[:, 0, 1] + task.displacement)
+    demand = carrying_force(flat) / flat["drive.motor_constant_ratio"]
+    at_rest = Steady(-task.displacement, pieces[:, 0, 1] + task.displacement, force=demand)
     values = shape.values(flat | motion, len(seeds))
     batch = prepare(shape, flat | motion, len(seeds), options, shape.unwound_at(values, at_rest, len(seeds)))
     end = np.zeros((len(pieces), 1, pieces.shape[2]))

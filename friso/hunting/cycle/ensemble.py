@@ -14,7 +14,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
-from friso.equations.structure import Structure, shared_structure
+from friso.equations.structure import Structure, carrying_force, shared_structure
 from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.transmission import BACKLASH
 
@@ -172,9 +172,8 @@ class Ensemble:
 
         It is zero if friction alone holds the constant forces; otherwise it balances these forces.
         """
-        constant = sum(np.asarray(self.flat[f"bias.{name}"]) for name in self.structure.biased)
-        held = np.abs(constant) < self.number("breakaway")
-        return np.where(held, 0.0, -constant) + np.zeros(self.count)
+        carrying = carrying_force(self.flat)
+        return np.where(np.abs(carrying) < self.number("breakaway"), 0.0, carrying) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
         """Return the imbalance of integrator and constant forces of sticking stages, (count,).

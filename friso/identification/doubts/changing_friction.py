@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.effects import (
     ExplainedResidual,
@@ -63,7 +63,7 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
 
     The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes.
     """
-    if "friction.coulomb" not in [parameter.name for parameter in fit.problem.parameters]:
+    if "friction.coulomb" not in fit.problem.names:
         return None
     forces, units, bends = changing_forces(fit, velocity)
     return _drift(explained_by_forces(fit, forces, units), bends)
@@ -78,10 +78,9 @@ def changing_forces(
     returns the sizes [N] at which they are tried, and the shapes of these lines.
     """
     settings = DoubtSettings.current()
-    way = np.clip(velocity / (settings.speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
     bends = _bends(np.linspace(0.0, 1.0, len(velocity)), fit.problem.counted)
-    forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
+    forces = [base * bend for base in (-way_of(velocity), np.ones(len(velocity))) for bend in bends]
     return forces, [unit] * len(forces), bends
 
 
@@ -115,8 +114,7 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
     """Return the fit with deviations that include the changes, and the shifts of the fit, of both forces."""
     further = np.abs(changes.moved)
-    for i, number in enumerate(fit.free):
-        name = fit.problem.parameters[number].name
+    for i, name in enumerate(fit.fitted):
         if name == "friction.coulomb":
             further[i] += changes.friction_reach / fit.value(name)
         elif name.startswith("bias."):
@@ -136,7 +134,7 @@ def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseMode
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield friction and a constant force that change along the record."""
-    if "friction.coulomb" in [parameter.name for parameter in case.fit.problem.parameters]:
+    if "friction.coulomb" in case.fit.problem.names:
         yield TriedForces(*changing_forces(case.fit, case.velocity)[:2])
 
 

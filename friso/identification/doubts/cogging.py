@@ -7,16 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
-from friso.identification.doubts.coupling import IMITATED
-from friso.identification.output_error.effects import reaching_over
-from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name a force that varies along the way, with its pitch, if it explains most of the residual."""
-    settings, effect = DoubtSettings.current(), case.leading
-    if effect is None or effect.doubt != "cogging" or case.quality.failed or case.quality.rejected:
+    effect = case.led_by("cogging")
+    if effect is None:
         return
     parts = zip(effect.explained.sizes, effect.tried.forces, strict=True)
     size = float(np.ptp(sum(share * force for share, force in parts)))
@@ -26,9 +23,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         f"A force along the way differs from place to place by {size:.2g} {case.unit}{every}: no stage file has one, "
         "and the intervals allow for it; slow passes to and fro over the same way would show it"
     )
-    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    named = RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
-    yield RaisedDoubt(fit=wider) if case.is_small(size) else named
+    yield case.named_along(effect, words, size)
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

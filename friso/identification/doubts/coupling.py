@@ -6,15 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
+from friso.identification.doubt import IMITATED, Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import motion
-from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.output_error.effects import is_sure_beside_all
 from friso.identification.output_error.parameters import BRISTLES, MASS, is_free
 from friso.identification.settings import DoubtSettings
 from friso.quantities import percent
-
-IMITATED = "what the model lacks would pass for it"
-"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
@@ -23,38 +20,31 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
     motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If the
     position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times that
-    derivative.
+    derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then.
     """
-    fit, settings, force = case.fit, DoubtSettings.current(), coupling_force(case)
-    if force is None or case.quality.failed or case.quality.rejected or is_free(case.flat):
-        return
-    explained = explained_by_forces(fit, [force], [settings.mass_share_of_a_tried_coupling])
-    if explained is None:
-        return
-    moved, (load,) = explained.moved, explained.sizes
-    names = [fit.problem.parameters[number].name for number in fit.free]
-    share = -float(np.expm1(moved[names.index(MASS)]))
-    further = reaching_over(fit, settings.reach_of_a_coupling * np.abs(moved))
-    if share * load <= 0 or abs(share) < settings.mass_share_of_a_coupling:
-        yield RaisedDoubt(fit=further)
-        return
-    words = _sentence(share) if case.may_name("coupling") else ""  # an averaged motion makes such a force too
-    yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
+    fit = case.fit
+    for tried, explained in case.explained(forces) if not is_free(case.flat) else ():
+        lighter, further = -float(explained.moved[fit.fitted.index(MASS)]), case.reaching(explained.moved)
+        if lighter * explained.sizes[0] <= 0 or not is_sure_beside_all(fit, tried.forces, tried.units):
+            yield RaisedDoubt(fit=further)
+            return
+        share = -float(np.expm1(-lighter))
+        words = _sentence(share) if case.may_name("coupling") else ""  # an averaged motion makes such a force too
+        yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 
-def coupling_force(case: FittedCase) -> np.ndarray | None:
-    """Return the force of a coupling [N], (n,), scaled to the standard deviation of the inertia.
-
-    Returns None if no mass is fitted, or the stage does not move.
-    """
-    fit, step = case.fit, case.log.sample_time
-    if MASS not in [fit.problem.parameters[number].name for number in fit.free]:
-        return None
-    cutoff = DoubtSettings.current().bandwidths_of_a_coupling * case.inverse.bandwidth
+def forces(case: FittedCase) -> Iterator[TriedForces]:
+    """Yield the force of a coupling, as large as the inertia, where a mass is fitted."""
+    fit, step, settings = case.fit, case.log.sample_time, DoubtSettings.current()
+    if MASS not in fit.fitted:
+        return
+    cutoff = settings.bandwidths_of_a_coupling * case.inverse.bandwidth
     acceleration = motion(case.log["position"][case.log.longest], step, cutoff).acceleration
     force = np.gradient(np.gradient(acceleration, step), step)
     size = float(np.std(force))
-    return force * (fit.value(MASS) * float(np.std(acceleration)) / size) if size > 0 else None
+    if size > 0:
+        force *= fit.value(MASS) * float(np.std(acceleration)) / size
+        yield TriedForces([force], [settings.mass_share_of_a_tried_coupling])
 
 
 def _sentence(share: float) -> str:
@@ -68,13 +58,6 @@ def _sentence(share: float) -> str:
         f"The force goes with the motion as if {where}: the mass may be {percent(abs(share))} {way}, for which the "
         "intervals allow; a frequency response would show the coupling"
     )
-
-
-def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the force of a coupling, where a mass is fitted."""
-    force = coupling_force(case)
-    if force is not None:
-        yield TriedForces([force], [DoubtSettings.current().mass_share_of_a_tried_coupling])
 
 
 DOUBT = Doubt(

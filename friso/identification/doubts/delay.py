@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
-from friso.identification.output_error.effects import explained_by_forces, reaching_over
+from friso.identification.output_error.effects import is_sure_beside_all
 from friso.identification.readings.common import low_pass
 from friso.identification.settings import DoubtSettings
 
@@ -17,24 +17,18 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
     A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
     turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. It is tried if the
-    stage follows the log.
+    stage follows the log. A slow motion cannot tell a delay from friction at its reversals: no delay is named then.
     """
-    fit, settings, step = case.fit, DoubtSettings.current(), case.log.sample_time
-    force = delay_force(case)
-    if case.quality.failed or case.quality.rejected or fit.problem.closed or not force.any():
-        return
-    explained = explained_by_forces(fit, [force], [settings.samples_of_a_tried_delay * step])
-    if explained is None:
-        return
-    moved, late = explained.moved, -float(explained.sizes[0])
-    words = ""
-    if abs(late) >= settings.samples_of_a_delay * step and case.may_name("delay"):
-        words = (
-            f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a delay "
-            "of the drive or between the channels, which passes for damping and viscous friction; the intervals allow "
-            "for it"
-        )
-    yield RaisedDoubt(words, late, "s", fit=reaching_over(fit, settings.reach_of_a_delay * np.abs(moved)))
+    for tried, explained in case.explained(forces):
+        late, words = -float(explained.sizes[0]), ""
+        long = abs(late) >= DoubtSettings.current().samples_of_a_delay * case.log.sample_time
+        if long and case.may_name("delay") and is_sure_beside_all(case.fit, tried.forces, tried.units):
+            words = (
+                f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a "
+                "delay of the drive or between the channels, which passes for damping and viscous friction; the "
+                "intervals allow for it"
+            )
+        yield RaisedDoubt(words, late, "s", fit=case.reaching(explained.moved))
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

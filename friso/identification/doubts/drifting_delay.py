@@ -7,25 +7,22 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
-from friso.identification.doubts.coupling import IMITATED
 from friso.identification.doubts.delay import delay_force
-from friso.identification.output_error.effects import explained_by_forces, reaching_over
-from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.output_error.effects import explained_by_forces
 from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the delays at beginning and end, if a changing delay explains more than one."""
-    settings, effect = DoubtSettings.current(), case.leading
-    if effect is None or effect.doubt != "drifting-delay" or case.quality.failed or case.quality.rejected:
+    effect = case.led_by("drifting-delay")
+    if effect is None:
         return
     late, more = (-float(size) for size in effect.explained.sizes)
     words = (
         f"The delay between force and motion changes along the record, from {late * 1e3:.2g} to "
         f"{(late + more) * 1e3:.2g} ms, as of two clocks: the intervals allow for it; log force and motion by one clock"
     )
-    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    yield RaisedDoubt(words, more, "s", fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    yield case.named(effect, words, more, "s")
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

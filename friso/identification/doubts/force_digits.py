@@ -15,25 +15,23 @@ from friso.quantities import percent
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Compare the resolution of the force with Coulomb friction.
 
-    The resolution is the step of which all steps of the force are multiples, in a log where most steps are zero. A
-    command in steps has none.
+    Noise of a digit and more makes up for coarse ones, so most steps of the force are zero in a log that is told.
     """
     settings, force = DoubtSettings.current(), case.log["force"][case.log.longest]
-    steps = np.abs(np.diff(force))
-    digit = float(steps[steps > settings.rounding_of_a_digit * steps.max(initial=0.0)].min(initial=np.inf))
-    coulomb = abs(case.inverse.value("coulomb"))
-    dithered = np.median(steps) > 0  # noise of a digit and more makes up for it
-    fine = not np.isfinite(digit) or digit < settings.friction_share_of_a_digit * coulomb
-    if dithered or fine or digit_of(force) == 0:
-        return
-    digits = steps / digit
-    if np.abs(digits - np.rint(digits)).max() > settings.error_of_a_whole_digit:
+    digit, coulomb = digit_of(force), abs(case.inverse.value("coulomb"))
+    if digit < settings.friction_share_of_a_digit * coulomb or np.median(np.abs(np.diff(force))) > 0 or digit == 0:
         return
     words = (
         f"The force is logged in steps of {digit:.2g} {case.unit}, {percent(digit / coulomb)} of Coulomb friction: "
         "what friction does at low speed is hidden in them; log it with more digits"
     )
-    yield RaisedDoubt(words, digit, case.unit)
+    yield RaisedDoubt(words, digit, case.unit, spoils=True)
 
 
-DOUBT = Doubt("record", find, "the steps of the force beside Coulomb friction", "reported", "a log with more digits")
+DOUBT = Doubt(
+    "record",
+    find,
+    "the steps of the force beside Coulomb friction",
+    "friction at low speed is refused",
+    "a log with more digits",
+)

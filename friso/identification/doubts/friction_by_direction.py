@@ -28,7 +28,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     both, settings = case.fit, DoubtSettings.current()
     if both.explains(case.quality.noise):
         return
-    names = [parameter.name for parameter in both.problem.parameters]
+    names = both.problem.names
     free = tuple(i for i in both.free if names[i] not in EITHER)
     counted = both.problem.counted
     ways = [counted * (way * case.velocity > 0) for way in (1, -1)]

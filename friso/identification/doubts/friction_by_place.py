@@ -8,16 +8,13 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
 from friso.identification.doubts.cogging import places_along
-from friso.identification.doubts.coupling import IMITATED
-from friso.identification.output_error.effects import reaching_over
-from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name by how much friction differs along the way, if that explains most of the residual."""
-    settings, effect = DoubtSettings.current(), case.leading
-    if effect is None or effect.doubt != "friction-by-place" or case.quality.failed or case.quality.rejected:
+    effect = case.led_by("friction-by-place")
+    if effect is None:
         return
     columns = places_along(case.log["position"][case.log.longest])
     friction = sum(share * column for share, column in zip(effect.explained.sizes, columns, strict=True))
@@ -26,21 +23,15 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         f"Friction differs along the way by {size:.2g} {case.unit}: the intervals reach from its least to its largest; "
         "slow passes to and fro over the same way would show it"
     )
-    further = settings.reach_of_an_effect * np.abs(effect.explained.moved)
-    for i, number in enumerate(case.fit.free):
-        if case.fit.problem.parameters[number].name == "friction.coulomb":
-            further[i] += reach / case.fit.value("friction.coulomb")
-    wider = reaching_over(case.fit, further)
-    named = RaisedDoubt(words, size, case.unit, fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
-    yield RaisedDoubt(fit=wider) if case.is_small(size) else named
+    yield case.named_along(effect, words, size, {"friction.coulomb": reach / case.fit.value("friction.coulomb")})
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a separate friction at each of several places along the way."""
     settings = DoubtSettings.current()
-    if "friction.coulomb" not in [parameter.name for parameter in case.fit.problem.parameters]:
+    if "friction.coulomb" not in case.fit.problem.names:
         return
-    along = [-column * way_of(case) for column in places_along(case.log["position"][case.log.longest])]
+    along = [-column * way_of(case.velocity) for column in places_along(case.log["position"][case.log.longest])]
     unit = settings.friction_share_of_a_tried_force * case.fit.value("friction.coulomb")
     yield TriedForces(along, [unit] * len(along))
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces, way_of
-from friso.identification.output_error.effects import reaching_over
 from friso.identification.settings import DoubtSettings
 from friso.quantities import percent
 
@@ -31,15 +30,14 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "preloaded screws does: no friction of the stage file does so, and the intervals allow for it; constant speeds "
         "with and without a load would show it"
     )
-    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    yield RaisedDoubt(words, share, fit=wider, explains=True)
+    yield RaisedDoubt(words, share, fit=case.reaching(effect.explained.moved), explains=True)
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield a force against the motion, in proportion to the motor's force."""
     settings = DoubtSettings.current()
     force = case.log["force"][case.log.longest]
-    against, least = -np.abs(force) * way_of(case), settings.shares_of_a_load[0]
+    against, least = -np.abs(force) * way_of(case.velocity), settings.shares_of_a_load[0]
     yield TriedForces([against], [settings.share_of_a_tried_load], least=least)
 
 

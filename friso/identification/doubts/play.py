@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
-from friso.identification.doubts.coupling import IMITATED
 from friso.identification.inverse_model import motion
-from friso.identification.output_error.effects import reaching_over
-from friso.identification.output_error.parameters import BRISTLES, MASS
+from friso.identification.output_error.parameters import MASS
 from friso.identification.readings.common import runs
 from friso.identification.settings import DoubtSettings, IdentificationSettings
 from friso.quantities import percent
@@ -23,8 +21,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     If the widest play that is tried explains most, something slower is the cause: it is not named, and the intervals
     allow for it.
     """
-    settings, effect = DoubtSettings.current(), case.leading
-    if effect is None or effect.doubt != "play" or case.quality.failed or case.quality.rejected:
+    settings, effect = DoubtSettings.current(), case.led_by("play")
+    if effect is None:
         return
     shares, width = effect.explained.sizes, effect.tried.label
     share = float(shares.max())
@@ -36,9 +34,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         f"{percent(share)} of the {what} while the load crosses it; it passes for soft bristles, which are refused, "
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
-    wider = reaching_over(case.fit, settings.reach_of_an_effect * np.abs(effect.explained.moved))
-    slower = np.isclose(width, max(settings.plays_tried))
-    named = RaisedDoubt(words, width, "m", fit=wider, refuses=dict.fromkeys(BRISTLES, IMITATED), explains=True)
+    slower, named = np.isclose(width, max(settings.plays_tried)), case.named(effect, words, width, "m")
     yield replace(named, words="", explains=False) if slower else named
 
 
@@ -49,8 +45,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
     that the load crosses within a few samples is not tried, because what happens between samples would pass for it.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
-    names = [parameter.name for parameter in fit.problem.parameters]
-    if MASS not in names or "friction.coulomb" not in names:
+    if not {MASS, "friction.coulomb"} <= {*fit.problem.names}:
         return
     cutoff = settings.bandwidths_of_a_play * IdentificationSettings.current().smoothing_bandwidths
     moved = motion(case.log["position"][case.log.longest], step, cutoff * case.inverse.bandwidth)

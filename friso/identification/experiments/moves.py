@@ -26,6 +26,12 @@ WITHOUT_CONTROLLER = (
     "intervals may be narrower, and more may be identified, as far as that loop explains the record"
 )
 
+OUT_OF_STEP = (
+    "with the controller of the stage file the simulated machine gets out of step with the log, which was therefore "
+    "fitted along its position; if the machine does not hunt, its controller is another: check the gains and the mass "
+    "it is tuned for"
+)
+
 
 def _claims(course: Course) -> str | None:
     """Claim a log whose reference moves, or without a periodic excitation.
@@ -96,6 +102,7 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER] if followed else []),
+        *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
         *(
             f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "
             "moves most"

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
-from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.fit import OutputErrorFit, spread_along
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.spread import correlation_length
 from friso.intervals import COVERAGE
@@ -19,12 +19,25 @@ class ExplainedResidual:
     """Effect of forces that the model leaves out on the residual of a fit.
 
     `moved` is the shift of the fitted numbers, shape (free,), `sizes` are the sizes of the effects, and `left` is the
-    remaining fraction of the residual's power.
+    remaining fraction of the residual's power, `rest` [N], shape (n,), with the derivatives `slopes` to all of these.
     """
 
     moved: np.ndarray
     sizes: np.ndarray
     left: float
+    rest: np.ndarray
+    slopes: np.ndarray
+
+    def is_sure(self, fit: OutputErrorFit) -> bool:
+        """Tell whether the last size differs from 0 by more than errors that return.
+
+        At the reversals of a slow sine, a coupling or a delay is the same as a friction that differs a little.
+        """
+        size = np.linalg.norm(self.slopes, axis=0)
+        usable = np.isfinite(size) & (size > 0)
+        variance = spread_along(fit.problem, self.slopes[:, usable], self.rest)[-1, -1]
+        chance = 1 - OutputErrorSettings.current().probability_of_an_effect
+        return bool(np.abs(self.sizes[-1]) > norm.isf(chance / 2) * np.sqrt(variance))
 
 
 def explained_by_forces(
@@ -62,7 +75,14 @@ def explained_by(
     if rest @ rest <= left @ left * (1 + chance / independent):
         return None
     moved, sizes = np.split(solution, [slopes.shape[1]])
-    return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest))
+    return ExplainedResidual(moved, sizes, float(left @ left) / float(rest @ rest), left, every)
+
+
+def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
+    """Tell whether the last size of further forces is sure if all numbers may follow."""
+    rest, slopes = beside_all_numbers(fit)
+    explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
+    return explained is not None and explained.is_sure(fit)
 
 
 def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:

@@ -54,6 +54,11 @@ class OutputErrorFit:
         return self.left < times * self.problem.noise_left(noise)
 
     @property
+    def fitted(self) -> list[str]:
+        """Return the names of the fitted parameters."""
+        return [self.problem.names[number] for number in self.free]
+
+    @property
     def bounded(self) -> set[int]:
         """The fitted numbers that are known well enough to be told: their intervals do not span all that may be."""
         settings, bounded = OutputErrorSettings.current(), set()
@@ -104,8 +109,7 @@ class OutputErrorFit:
 
     def value(self, name: str) -> float:
         """Return the value of a parameter in SI units."""
-        names = [parameter.name for parameter in self.problem.parameters]
-        i = names.index(name)
+        i = self.problem.names.index(name)
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 
@@ -252,12 +256,21 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
         [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress
     ).inner[0]
     rest, slopes = problem.linearised(best, mask)
+    covariance = spread_along(problem, slopes, rest)
+    moved = [_moved_by(inputs, problem, best, slopes, rest) for inputs in problem.unsettled]
+    return OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
+
+
+def spread_along(problem: Problem, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return the covariance of numbers fitted to a problem, shape (p, p).
+
+    The residual `rest` [N] has the shape (n,), its derivatives `slopes` (n, p). Errors return with time, place and
+    speed: the many reversals of one sine say no more than a few.
+    """
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
     groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))
-    covariance = spread_of(slopes[counted], rest[counted], groups)
-    moved = [_moved_by(inputs, problem, best, slopes, rest) for inputs in problem.unsettled]
-    return OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
+    return spread_of(slopes[counted], rest[counted], groups)
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:

@@ -58,7 +58,7 @@ def fit_identifiable(
     that hunts soon gets out of step; the loop then only improves values, unless it cannot follow. If the fit is clearly
     better with undetermined parameters it keeps them, because friction and mass would otherwise absorb their effect.
     """
-    names = [parameter.name for parameter in follows.parameters]
+    names = follows.names
     core = {parameter.name for parameter in follows.parameters if parameter.core}
     part = between(progress, 0, PLAIN, "moves: mass and sliding friction along the log")
     plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None], part)
@@ -93,7 +93,7 @@ def _identifiable_on_log(
 
     `plain` is the fit of the `core` parameters alone. Parameters that the motion cannot show are not tried.
     """
-    names = [parameter.name for parameter in follows.parameters]
+    names = follows.names
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
     plain = with_force_settled(with_smoothness_settled(plain), noise)
     follows = plain.problem
@@ -121,26 +121,28 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """Profile all parameters that not every motion shows, and decide which of them to report.
+    """Profile parameters that not every motion shows, and decide which of them to report.
 
     If the fit has `explained` the record, a sharp profile suffices; otherwise the motion must also cover the effect of
-    the parameter. If a profile finds a clearly better fit, that one replaces it.
+    the parameter, and others have no profile. If a profile finds a clearly better fit, that one replaces it.
     """
-    names = [parameter.name for parameter in full.problem.parameters]
-    asked = [i for i in full.free if names[i] not in core]
+    names = full.problem.names
     profiles: dict[str, Profile] = {}
     again = OutputErrorSettings.current().better_fits_by_profiles
-    while len(profiles) < len(asked):
-        i = asked[len(profiles)]
-        progress(len(profiles), len(asked), f"moves: how well {names[i]} is known")
+    while True:
+        blurred = any(name in STRIBECK and not _sharp(full, seen) for name, seen in profiles.items())
+        rest = {*names} - core - profiles.keys() - {*(CURVE if blurred else ())}
+        asked = [i for i in full.free if names[i] in rest and (explained or _covers(full, names[i], covered))]
+        if not asked:
+            break
+        i = asked[0]
+        progress(len(profiles), len(profiles) + len(asked), f"moves: how well {names[i]} is known")
         seen, fits = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
         profiles[names[i]] = seen
         if again and fits.cost.min() < full.cost * (1 - WORSE / full.independent):
             again -= 1
             full, profiles = polished(full.problem, full.free, fits.inner[np.argmin(fits.cost)]), {}
-    shown = {
-        name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
-    }
+    shown = {name for name, seen in profiles.items() if _sharp(full, seen)}
     return IdentifiableFit(full, profiles, frozenset(_complete(shown, {*names} - core)))
 
 

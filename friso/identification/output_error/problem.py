@@ -71,6 +71,11 @@ class Problem:
     cutoffs: tuple[float, ...] = (np.inf,)
 
     @property
+    def names(self) -> list[str]:
+        """Return the names of the parameters."""
+        return [parameter.name for parameter in self.parameters]
+
+    @property
     def kernel(self) -> Kernel:
         """The compiled equations of the stage."""
         return kernel(self.form)

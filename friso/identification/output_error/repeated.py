@@ -10,11 +10,13 @@ from scipy.stats import t as student
 
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import digit_of
-from friso.identification.spread import CONFIDENCE
+from friso.identification.settings import IdentificationSettings
+from friso.identification.spread import CONFIDENCE, binned
 from friso.intervals import COVERAGE
 from friso.progress import Progress
 
@@ -56,13 +58,11 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     This is for a stage that followed a log which it does not explain to its noise: a delay passes for damping, times
     the stiffness.
     """
-    names = [parameter.name for parameter in fit.problem.parameters]
-    places = {names[number]: place for place, number in enumerate(fit.free)}
-    if not {"friction.bristle_stiffness", "friction.bristle_damping"} <= places.keys():
+    if not {*BRISTLES} <= {*fit.fitted}:
         return fit
     late = fit.value("friction.bristle_stiffness") * fit.problem.inputs.sample_time
     covariance = fit.covariance.copy()
-    place = places["friction.bristle_damping"]
+    place = fit.fitted.index("friction.bristle_damping")
     covariance[place, place] += (late / fit.value("friction.bristle_damping") / COVERAGE) ** 2
     return replace(fit, covariance=covariance)
 
@@ -73,23 +73,36 @@ def _simulated_logs(
     """Yield problems with simulated logs of the fitted machine.
 
     Their force is that of the log and of the guiding controller, their position is the stage's own, and both have the
-    log's noise. A force whose resolution is coarser than its noise is rounded to it.
+    log's noise. A force whose resolution is coarser than its noise has errors of rounding instead.
     """
     settings = OutputErrorSettings.current()
     problem = once.problem
     record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
     measured = log["position"][part]
     blur, digit = blur_of(measured, problem.inputs.reference), digit_of(log["force"][part])
+    rounded, speed = 0 < noise <= digit / np.sqrt(12), np.abs(problem.inputs.velocity)
     for number in range(settings.repetitions_of_a_fit):
         progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
         signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
         force = problem.inputs.force + record.force
-        rounded = 0 < noise <= digit / np.sqrt(12)
-        signals["force"][part] = (
-            np.round(force / digit) * digit if rounded else force + noise * rng.standard_normal(len(measured))
-        )
+        rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
+        signals["force"][part] = force + rough
         like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
         level = len(like.sharper) - len(problem.sharper)
         like = like.held_to(level - 1) if level else like
         yield replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
+
+
+def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random.Generator) -> np.ndarray:
+    """Draw errors of rounding [N], (n,), of a force that was logged in coarse digits [N].
+
+    Forces at one level and one `speed` [m/s] are rounded alike, in both directions, so that errors last as long as a
+    motion is steady and do not average out as noise does. Rounding the force of the fit again would not show them: its
+    levels are those that the rounded log has.
+    """
+    levels = np.stack(
+        [np.rint(np.abs(force) / digit), binned(speed, IdentificationSettings.current().bins_of_place_and_speed)]
+    )
+    alike = np.unique(levels, axis=1, return_inverse=True)[1].ravel()
+    return digit * np.sign(force) * (rng.random(alike.max() + 1) - 0.5)[alike]

@@ -27,7 +27,7 @@ class OutputErrorSettings(Settings):
     range_share_of_core_starts: float = setting(0.02, "")
     """Distance of starts of parameters that may be 0, each way, relative to their range."""
 
-    samples_of_all_starts: float = setting(1e7, "")
+    samples_of_all_starts: float = setting(6e6, "")
     """Samples over which all starts together are simulated. Longer records are cut."""
 
     stretches_of_a_screening: int = setting(8, "")
@@ -120,7 +120,7 @@ class OutputErrorSettings(Settings):
     """Relative difference below which the sample times of log and drive are equal."""
 
     # Profiles: how far a parameter can be moved, all others following.
-    points_of_a_profile: int = setting(7, "")
+    points_of_a_profile: int = setting(5, "")
     """Values over its range at which a parameter is fixed. Fewer make intervals coarser, not narrower."""
 
     deviations_of_a_profile: float = setting(4.0, "")

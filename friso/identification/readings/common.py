@@ -67,11 +67,7 @@ def deflection(log: Log) -> np.ndarray | None:
 
     It is measured, or that of two sensors; None without either.
     """
-    if "relative_position" in log:
-        return channel(log, "relative_position")
-    if "cart_position" in log and "position" in log:
-        return channel(log, "position") - channel(log, "cart_position")
-    return None
+    return _apart(log, "relative_position", "cart_position")
 
 
 def cart(log: Log) -> np.ndarray | None:
@@ -79,11 +75,14 @@ def cart(log: Log) -> np.ndarray | None:
 
     It is measured, or that of two sensors; None without either.
     """
-    if "cart_position" in log:
-        return channel(log, "cart_position")
-    if "relative_position" in log and "position" in log:
-        return channel(log, "position") - channel(log, "relative_position")
-    return None
+    return _apart(log, "cart_position", "relative_position")
+
+
+def _apart(log: Log, role: str, other: str) -> np.ndarray | None:
+    """Return the values of a role, or the position less the `other` one; None without either."""
+    if role in log:
+        return channel(log, role)
+    return channel(log, "position") - channel(log, other) if {"position", other} <= log.signals.keys() else None
 
 
 def on_bearing(log: Log) -> np.ndarray:

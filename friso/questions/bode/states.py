@@ -78,7 +78,7 @@ def dash(name: str) -> Dash:
 
 def place(member: Members, bode: Bode) -> str:
     """Return a state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
-    return in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), has_limiter(bode))
+    return in_words(cart(member, bode), bool(member.touched[0]), has_limiter(bode))
 
 
 def in_words(cart: str, touched: bool, limited: bool) -> str:
@@ -86,9 +86,16 @@ def in_words(cart: str, touched: bool, limited: bool) -> str:
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 
-def cart(member: Members) -> str:
-    """Say what the cart does: stuck, under a bias force, or sliding at a speed."""
+def cart(member: Members, bode: Bode) -> str:
+    """Say what the cart does: stuck, under a bias force, or sliding at a speed; empty without friction.
+
+    The highest speed stands for sliding fast, where friction no longer falls. No motion need reach that.
+    """
+    if not has_friction(bode):
+        return ""
     if not member.stuck[0]:
+        if member.speed[0] == bode.scan.members.speed.max():
+            return f"sliding fast{'' if member.forward[0] else ' backwards'}"
         return f"sliding{'' if member.forward[0] else ' backwards'} at {with_unit(member.speed[0], 'm/s')}"
     return f"stuck under a bias force of {with_unit(member.bias[0], 'N')}" if member.bias[0] else "stuck"
 

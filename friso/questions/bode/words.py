@@ -206,7 +206,7 @@ def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Memb
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
-    state = in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), name == "free")
+    state = in_words(cart(member, bode), bool(member.touched[0]), name == "free")
     return f" ({where}, {meaning}: {state})"
 
 

@@ -8,7 +8,7 @@ from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
-from friso.shown.drawing.prefixes import NOTHING, range_with_unit, share_with_interval
+from friso.shown.drawing.prefixes import NOTHING, percentage, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
 from friso.studies.settings import StudySettings
 
@@ -106,10 +106,13 @@ def _sentence(name: str, draws: Draws) -> str:
     sentences = (
         [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction."] if lost else []
     )
+    hunting, attracted = (share_with_interval(fates.share(words)) for words in (("hunts",), ATTRACTED))
+    none = "none hunts, and none has a cycle that attracts (fewer than {} % of all, with 95 % confidence)"
     sentences += [
-        f"of {draws.sample.count} draws, hunts with a probability of {share_with_interval(fates.share(('hunts',)))}, "
-        f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}{_swings(fates)}"
-        f"{_edge(draws) if name == 'given' else ''}."
+        f"of {draws.sample.count} draws, hunts with a probability of {hunting}, has a cycle that attracts with "
+        f"{attracted}{_swings(fates)}{_edge(draws) if name == 'given' else ''}."
+        if (share := fates.share(ATTRACTED)).probability
+        else f"of {draws.sample.count} draws, {none.format(percentage(share.high))}."
     ]
     if failed:
         noun, pronoun = ("draw", "it") if failed == 1 else ("draws", "them")

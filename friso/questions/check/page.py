@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from friso.hunting.criteria import PEAK_RULE
 from friso.questions.check.draws import draws_figure, draws_sentences
 from friso.questions.check.figures import check_figures
 from friso.questions.check.isolator_words import isolator_sentence
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 
 BASIS = (
-    "The verdict is by everything that attracts the stage; peaks are also counted, as in the thesis (Fix, Univ. of "
-    "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference; "
+    "The verdict is by everything that attracts the stage. Peaks are counted beside it: maxima of the position "
+    f"{PEAK_RULE} (Fix, Univ. of Twente, Sec. 3.2.2). Settling times count from the last corner of the reference; "
     "where it stands at several places, the longest"
 )
 
@@ -67,7 +68,7 @@ def check_html(
             *filter(None, [conclusion(cases)]),
             *(f"{omitted}." for omitted in [left_out(stage)] if omitted),
             *motion_sentences(stage),
-            *filter(None, [stage.controller.note(stage.flat())]),
+            *filter(None, [stage.controller.note(stage.flat()), stage.note]),
             *([isolator_sentence(isolator)] if isolator else []),
             *(draws_sentences(draws) if draws else []),
             *(laws_sentences(laws) if laws else []),

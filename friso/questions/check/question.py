@@ -103,7 +103,8 @@ class CheckAnswer(Answer):
         drawn = draws_sentences(self.draws) if self.draws else []
         if self.cut and not self.draws:
             drawn = ["Interrupted: no stages were drawn yet."]
-        short = [*motion_sentences(self.stage), *filter(None, [self.stage.controller.note(self.stage.flat())])]
+        notes = filter(None, [self.stage.controller.note(self.stage.flat()), self.stage.note])
+        short = [*motion_sentences(self.stage), *notes]
         return [*drawn, *answer(self.result), *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:

@@ -60,6 +60,9 @@ ONE_PLACE = 1.01
 ROUGH = 5e-4
 """Relative reserve of an edge from which it is mentioned, because the digits shown are then not certain."""
 
+ROUGHER = 10 * ROUGH
+"""Relative reserve of an edge from which one digit less is shown."""
+
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     """Say what a case does, and what to do about it.
@@ -339,9 +342,9 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         return f"somewhere between {low} and {high}"
     if end.reserve < ROUGH:
         return _bandwidth(case, end.inside, up=None, digits=4)
-    value = end.inside * (_present_bandwidth(case) or 1.0)
-    bound = end.reserve + abs(float(f"{value:.4g}") / value - 1)
-    return f"{_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(bound, 1), 1)})"
+    value, digits = end.inside * (_present_bandwidth(case) or 1.0), 4 if end.reserve < ROUGHER else 3
+    bound = end.reserve + abs(float(f"{value:.{digits}g}") / value - 1)
+    return f"{_bandwidth(case, end.inside, up=None, digits=digits)} (± {percent(rounded_up(bound, 1), 1)})"
 
 
 def _present_bandwidth(case: Case) -> float | None:

@@ -25,12 +25,12 @@ from friso.shown.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design | UnfinishedDesign) -> dict[str, Any]:
-    """Return the whole design except its files; what an interrupted design has not decided is null."""
+    """Return the whole design except its files; what an unfinished design has not decided is null."""
     if isinstance(design, UnfinishedDesign):
         return plain_json(
             {
                 "conclusion": " ".join(so_far(design)),
-                "interrupted": True,
+                "interrupted": design.interrupted,
                 **dict.fromkeys(("feasible", "relax", "without", "front", "verification")),
                 "stage": design.original.name,
                 "spec": design.spec.name,

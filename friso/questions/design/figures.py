@@ -53,7 +53,7 @@ CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", IN
 
 
 def design_figures(design: Design | UnfinishedDesign) -> tuple[Figure, ...]:
-    """Return all figures in the order in which they are read; none of a design that was interrupted."""
+    """Return all figures in the order in which they are read; none of an unfinished design."""
     if isinstance(design, UnfinishedDesign):
         return ()
     modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")

@@ -25,14 +25,14 @@ LEAVES = 2
 
 
 NOT_VERIFIED = "design-not-verified.toml"
-"""Name of the stage file of an interrupted design."""
+"""Name of the stage file of an unfinished design."""
 
 
 def design_files(design: Design | UnfinishedDesign) -> dict[str, Content]:
     """Return the stage files, the page, the drawing, and every figure in all formats.
 
-    The stage files are the design and the worst machine that was tried with it; of a design that was interrupted, the
-    stage so far is the only file.
+    The stage files are the design and the worst machine that was tried with it; of an unfinished design, the stage
+    so far is the only file.
     """
     if isinstance(design, UnfinishedDesign):
         return {NOT_VERIFIED: design.stage.to_toml()}

@@ -30,7 +30,7 @@ from friso.stage import Stage, numeric_keys
 
 
 class DesignAnswer(Answer):
-    """A design; `result` is a `Design`, after Ctrl-C an `UnfinishedDesign`; ``answer.stage`` is the designed stage."""
+    """A design; `result` is a `Design`, or an `UnfinishedDesign`; ``answer.stage`` is the designed stage."""
 
     status = 2
 
@@ -39,22 +39,27 @@ class DesignAnswer(Answer):
         """Say which requirements are not met; empty if all are."""
         from friso.questions.design.words import shortfall
 
-        if self.interrupted or self.result.meets:
+        if self.unfinished or self.result.meets:
             return ""
         return f"the design does not meet the specification: {shortfall(self.result)}"
 
     @property
-    def interrupted(self) -> bool:
-        """Tell whether the design was not verified because Ctrl-C ended the work."""
+    def unfinished(self) -> bool:
+        """Tell whether the design was not verified, after Ctrl-C or because no isolator is needed."""
         from friso.design_method.method import UnfinishedDesign
 
         return isinstance(self.result, UnfinishedDesign)
 
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether the design was not verified because Ctrl-C ended the work."""
+        return self.unfinished and self.result.interrupted
+
     def details(self) -> Sequence[str]:
-        """Return the steps of the method with their reasons; none of a design that was interrupted."""
+        """Return the steps of the method with their reasons; none of a design that was not verified."""
         from friso.questions.design.steps import steps
 
-        if self.interrupted:
+        if self.unfinished:
             return ()
         return [
             f"{number}. {step.title}: {' '.join(step.sentences)}" for number, step in enumerate(steps(self.result), 1)
@@ -69,6 +74,7 @@ def design(
     set: Changes = None,
     crossover: FrequencyLike | None = None,
     laws: bool = False,
+    anyway: bool = False,
     progress: Progress = silent,
 ) -> DesignAnswer:
     """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and its reasons.
@@ -81,6 +87,8 @@ def design(
         Crossover that can be reached, "20 Hz", in place of the limit in the specification.
     laws : bool
         Take the worst edge of hunting over all friction laws that keep what is measured.
+    anyway : bool
+        Design and try the isolator even if none is needed.
 
     Returns
     -------
@@ -111,14 +119,14 @@ def design(
         LOGGER.warning(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
         )
-    from friso.design_method.method import DesignInterrupted, own_law
+    from friso.design_method.method import DesignInterrupted, NotNeeded, own_law
     from friso.design_method.method import design as designed
     from friso.studies.laws.verdicts import frictions_that_keep
 
     try:
-        return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law))
-    except DesignInterrupted as interrupted:
-        return DesignAnswer(interrupted.so_far)
+        return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law, anyway))
+    except (DesignInterrupted, NotNeeded) as ended:
+        return DesignAnswer(ended.so_far)
 
 
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:

@@ -41,8 +41,11 @@ class DesignStep:
 
 
 def so_far(design: UnfinishedDesign) -> list[str]:
-    """Say what is decided of a design that was interrupted, and what is not known of it."""
+    """Say what is decided of a design that was not verified, and what is not known of it."""
     crossover = design.stage.flat()[CROSSOVER]
+    if not design.interrupted:
+        wanted = f"An isolator that was not tried in moves: {isolator(design.fitted, crossover)}. With --anyway it is."
+        return [need_words(design.need), wanted]
     hunts = (
         "whether the machine hunts with it is not known"
         if design.edges is None

@@ -35,6 +35,8 @@ def notes(gains: Gains) -> list[str]:
     texts = []
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
+    if not any(unit.startswith("A") for row in gains.conversions for _, unit in row.values):
+        texts.append('Amperes are added by --set motor_constant="30 N/A" (per turn: "0.5 N*m/A"; or an [actuator])')
     if gains.kind is not None:
         texts.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")
         if gains.not_held:

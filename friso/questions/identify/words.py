@@ -14,7 +14,6 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import nothing_learnt
-from friso.identification.stage_file import CHOSEN
 from friso.identification.ways import ways_to_show
 from friso.questions.identify.kind_view import Facts, PredictionView, view_of
 from friso.questions.identify.laws import TITLE, how, law_facts, law_sentence
@@ -257,17 +256,8 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
     lines = [sentence for _, sentence in headline(identification)]
     lines += [] if identification.laws is None else [law_sentence(identification.laws)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
-    lines += _chosen(identification)
+    lines += [identification.stage.note] if identification.stage and identification.stage.note else []
     return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]
-
-
-def _chosen(identification: Identification) -> list[str]:
-    """Warn that the controller in the stage file is friso's choice; empty if it is the user's."""
-    table = "controller"
-    sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
-    if identification.stage is None or sources != {CHOSEN}:
-        return []
-    return [f"The [{table}] of the stage file is our choice: put yours there before you ask whether the stage hunts."]
 
 
 def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -69,10 +70,17 @@ def next_command(content: LogContent) -> str | None:
 
     It holds the options given and those still needed. Returns None if no option supplies what the file lacks.
     """
-    options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps)])
+    scales = [f'--scale force="YOUR MOTOR CONSTANT N/{channel.unit}"' for channel in _currents(content)]
+    scaled = any(option.startswith("--scale force") for option in content.options)
+    options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps), *([] if scaled else scales)])
     if "" in options:
         return None
     return " ".join(["friso identify", shell_word(str(content.path)), *options])
+
+
+def _currents(content: LogContent) -> list[ChannelContent]:
+    """Return the channels taken for the force that are in amperes."""
+    return [one for one in content.channels if one.role == "force" and re.fullmatch(r"[mk]?A", one.unit)]
 
 
 def channel_rows(content: LogContent) -> list[tuple[str, list[str]]]:

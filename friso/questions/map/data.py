@@ -17,6 +17,7 @@ from friso.errors import InputError
 from friso.hunting.measures import BANDS
 from friso.questions.check.traces import common_range
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, coloured, look, pick, plane_first
+from friso.questions.map.figures import edge_of_hunting
 from friso.questions.map.places import SHOWN
 from friso.questions.map.words import variable, words_of
 from friso.shown.drawing.colours import scale
@@ -57,6 +58,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
         "axes": [_axis(axis, positions, flat) for axis, positions in zip(axes, cells.positions(), strict=True)],
         "machine": SHOWN,
         "order": [axes.index(axis) for axis in order],
+        "edge": _edge(runs, metric, order) if len(axes) == 2 and not sampled else None,
         "variables": [_coloured(runs, name, cells) for name in coloured(runs)],
         "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
@@ -151,6 +153,17 @@ def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dic
         "words": list(axis.words),
         "values": [_shortened(value * factor) for value in values],
     }
+
+
+def _edge(runs: xr.Dataset, metric: str, order: list[CellAxis]) -> list[list[float | None]] | None:
+    """Return the curve on which hunting ends, in the units of the axes; None where the map has no such curve."""
+    curves = edge_of_hunting(runs, metric, *order)
+    factors = [choose(axis.positions, axis.unit, log=axis.log)[0] for axis in order]
+    return [
+        [None if np.isnan(value) else _shortened(float(value) * factor) for value in places]
+        for curve in curves
+        for places, factor in zip((curve.x, curve.y), factors, strict=True)
+    ] or None
 
 
 def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:

@@ -98,6 +98,13 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
     )
 
 
+def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
+    """Return the curve that separates cells in which hunting attracts from the others, over two axes."""
+    colouring = look(runs, metric)
+    codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
+    return _edges(x, y, colouring, codes)
+
+
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 

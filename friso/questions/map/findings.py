@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.hunting.criteria import ATTRACTED, RESTS, SWINGS
+from friso.hunting.criteria import ATTRACTED, CREEPS, RESTS, SWINGS
 from friso.quantities import percent
 from friso.questions.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.questions.map.words import (
@@ -173,7 +173,14 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
-    """Say where counts on a map disagree with the end of the run."""
+    """Say where counts on a map, or verdicts, disagree with the end of the run."""
+    if name in worded(verdicts=True) and name != "outcome" and {name, "outcome"} <= set(runs.data_vars):
+        hidden = int(((runs[name].values == "hunts") & np.isin(runs["outcome"].values, (RESTS, CREEPS))).sum())
+        text = (
+            f"In {grouped(hidden)} of the cells that hunt the run does not show it: the cycle lasts longer than the "
+            "run, or begins after it. A longer motion.duration shows it."
+        )
+        return [text] if hidden else []
     if name not in metrics() or not metrics()[name].counts or not {name, "outcome"} <= set(runs.data_vars):
         return []
     counted, outcome = runs[name].values, runs["outcome"].values
@@ -207,23 +214,26 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
     answer = [*loop_first(study.stage), headline(runs, metric)]
-    return [*answer, *own_place(runs, study, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
+    return [*answer, *own_place(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
 
 
-def own_place(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+def own_place(runs: xr.Dataset, metric: str) -> list[str]:
     """Say how far the stage as given is from the next edge of hunting along each axis.
 
     Nothing is said for a stage that is not on the map, or a map without verdicts.
     """
+    from friso.questions.map.data import machine_of
+
+    machine = machine_of(runs)
     if (
         metric == "outcome"
         or metric not in worded(verdicts=True)
         or metric not in runs
-        or study.links
+        or machine is None
         or SAMPLE in runs.dims
     ):
         return []
-    axes, flat = axes_of(runs), {**dict.fromkeys(SCALINGS, 1.0), **study.stage.flat()}
+    axes, flat = axes_of(runs), {**dict.fromkeys(SCALINGS, 1.0), **machine.flat()}
     own = [flat[axis.key] for axis in axes if axis.key in flat and _spans(axis, flat[axis.key])]
     if len(own) < len(axes):
         return []

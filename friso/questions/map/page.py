@@ -10,10 +10,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from friso.hunting.criteria import PEAK_RULE
 from friso.questions.map.cells import SAMPLE, axes_of
 from friso.questions.map.data import machine_of, page_data, picked
 from friso.questions.map.figures import map_figure
-from friso.questions.map.findings import caveats, failures, headline, meanings, verification
+from friso.questions.map.findings import caveats, failures, headline, meanings, own_place, verification
 from friso.questions.map.places import SHOWN, with_places
 from friso.questions.map.words import grouped, tallied, tally, variable
 from friso.shown.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
@@ -68,6 +69,8 @@ def map_html(
         values={
             "headline": headline(runs, metric),
             "verification": verification(runs),
+            "own_place": own_place(runs, metric),
+            "peak_rule": PEAK_RULE,
             "facts": _facts(runs, metric),
             "thinned": _thinned(runs),
             "undrawn": drawn is None,

@@ -169,6 +169,7 @@
     const layout = { template: "none", margin: { l: 72, r: 14, t: 30, b: 54 }, hovermode: "closest",
       font: { family: "system-ui, sans-serif", size: 12, color: INK }, showlegend: false, hoverlabel: { bgcolor: "#444444", font: { color: "white" } },
       xaxis: plotAxis(data.axes[across]), yaxis: plotAxis(yAxis()), uirevision: "kept" };
+    if (!points && data.edge && shown.name === data.metric) traces.push(edge());
     if (isHere()) traces.push(machine(layout));
     if (selected) traces.push(ring(height));
     const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
@@ -190,6 +191,11 @@
   const shownAxes = points && !data.sampled ? [across] : [across, up];
   const isHere = () => shownAxes.every((i) => data.axes[i].machine !== null)
     && (data.sampled || further.every((i) => data.axes[i].machine === null || isNear(data.axes[i], i)));
+
+  function edge() {
+    const [x, y] = data.edge;
+    return { type: "scatter", mode: "lines", x, y, line: { color: INK, width: 2 }, hoverinfo: "skip", showlegend: false };
+  }
 
   function machine(layout) {
     const [x, y] = shownAxes.map((i) => data.axes[i].machine);
@@ -218,6 +224,11 @@
       swatch.style.background = kind.colour;
       entry.append(kind.label);
     });
+    if (!points && data.edge && shown.name === data.metric) {
+      const entry = element("li", key);
+      element("span", entry).className = "swatch edge";
+      entry.append("edge of hunting");
+    }
     if (!isHere()) return;
     const entry = element("li", key);
     const mark = element("span", entry);

@@ -1,4 +1,4 @@
-"""Peaks of a run, counted as in the thesis"""
+"""Peaks of a run: maxima of the position that stand out late in it"""
 
 from friso.hunting.criteria import PEAK_CRITERION
 from friso.studies.metric import MapFinding, Metric

@@ -33,7 +33,7 @@ def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
     if moves.fit.problem.closed:
         method = "The machine was simulated in closed loop on the logged reference."
     elif moves.loop is not None:
-        method = f"In closed loop the simulated machine gets out of step with the log. For the fit, {along}"
+        method = f"In closed loop the simulated machine gets out of step with the log: {along}"
     else:
         method = f"{along[0].upper()}{along[1:]}"
     if not moves.covered.steady.size:
