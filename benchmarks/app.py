@@ -1,9 +1,9 @@
-"""Time `friso app` in Chromium, from an input event to the painted picture: python -m benchmarks.app.
+"""Time `friso app` in Chromium, from an input event to the painted picture.
 
-A slider of the thesis rig is moved step by step; each step waits for the picture. The benchmark prints medians and 95th
-percentiles [ms] for the picture, and for the first picture of a map and of the Bode plots after the click on their
-tabs. Then the slider is dragged, a step with every frame that the browser paints. It prints the time between frames,
-and the memory of page and server before and after the drags.
+Run by `python -m benchmarks.app`. A slider of the thesis rig is moved step by step; each step waits for the picture.
+The benchmark prints medians and 95th percentiles [ms] for the picture, and for the first picture of a map and of the
+Bode plots after the click on their tabs. Then the slider is dragged, a step with every frame that the browser paints.
+It prints the time between frames, and the memory of page and server before and after the drags.
 """
 
 from __future__ import annotations

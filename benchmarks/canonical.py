@@ -1,9 +1,10 @@
-"""Reference numbers of the equations: they change with the physics, not when code is rearranged.
+"""Reference numbers of the equations, which change with the physics alone.
 
-A few stages that between them use every friction law, joint and controller are followed through the declared equations
-from rest, by the classical Runge-Kutta method with a fixed step in plain Python. Outputs over time are stored, which
-depend neither on the names nor on the order of states or files, nor on the solver. Evidence states the revision of the
-equations it was computed with (`friso.evidence`), and a revision is such a set of numbers.
+They stay if code is rearranged. A few stages that between them use every friction law, joint and controller are
+followed through the declared equations from rest, by the classical Runge-Kutta method with a fixed step in plain
+Python. Outputs over time are stored, which depend neither on the names nor on the order of states or files, nor on the
+solver. Evidence states the revision of the equations it was computed with (`friso.evidence`), and a revision is such a
+set of numbers.
 """
 
 from __future__ import annotations
@@ -145,7 +146,10 @@ def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
 
 
 def _neutral(model: Model) -> list[float]:
-    """Return table values for a clock: factors of friction and motor other than 1, a force, a moving floor."""
+    """Return table values for a clock: factors of friction and motor, a force, a moving floor.
+
+    The factors differ from 1.
+    """
     if model.clock is None:
         return []
     return [0.9 + 0.05 * k for k in range(len(model.clock.places))] + [0.1] * len(model.clock.times)

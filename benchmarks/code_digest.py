@@ -35,7 +35,7 @@ def code_digest(places: Sequence[str]) -> str:
 
 
 def computed(source: str) -> str:
-    """Return the syntax of a module, with its own names replaced by numbers in order of occurrence."""
+    """Return the syntax of a module, with its own names numbered by occurrence."""
     tree = ast.parse(source)
     own = {name for node in ast.walk(tree) for name in _bound(node)}
     numbers: dict[str, str] = {}
@@ -71,7 +71,7 @@ def _bound(node: ast.AST) -> Iterator[str]:
 
 
 def _prose(part: object) -> bool:
-    """Tell whether a statement is for readers alone: an import, a docstring, a declaration of a type."""
+    """Tell whether a statement is for readers alone: import, docstring, declared type."""
     if isinstance(part, ast.AnnAssign) and part.value is None:
         return True
     docstring = isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant)

@@ -93,7 +93,7 @@ print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 
 @dataclass(frozen=True)
 class Timed:
-    """A command as typed, with its wall and CPU times [s]: first with an empty cache, then for each warm run."""
+    """A command as typed, with wall and CPU times [s]: with an empty cache, then warm."""
 
     command: str
     wanted: float | None

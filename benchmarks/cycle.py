@@ -46,7 +46,10 @@ def stage_of(changes: dict[str, Any]) -> Stage:
 
 
 def run_verdict(repetitions: int) -> list[Goal]:
-    """Time cycle, multipliers and return map of a stage, and the starts of hunting if its cycle attracts."""
+    """Time cycle, multipliers and return map of a stage, and the starts of hunting.
+
+    Starts are timed if the cycle attracts.
+    """
     rows, cycles, rests = [], [], []
     for name, changes in CASES.items():
         stage = stage_of(changes)
@@ -113,7 +116,7 @@ def run_map(repetitions: int) -> list[Goal]:
 
 
 def run_accuracy() -> list[Goal]:
-    """Compare period, amplitude and multiplier at the usual tolerance with those at a hundredth of it."""
+    """Compare period, amplitude and multiplier at the usual tolerance and at a hundredth."""
     rows, goals = [], []
     for name, changes in {**CASES, "locked, 4 Hz": {**LOCKED, "controller.crossover": "4 Hz"}}.items():
         stages = Ensemble.held(stage_of(changes).flat(), 1)

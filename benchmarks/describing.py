@@ -1,4 +1,7 @@
-"""Compare describing functions with simulations: the tables of docs/evidence/describing.md, in three minutes."""
+"""Compare describing functions with simulations, for docs/evidence/describing.md.
+
+It takes three minutes.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +61,10 @@ def print_locked(rigid: Stage) -> None:
 
 
 def print_branches(rigid: Stage) -> None:
-    """Print, at 5 Hz, the forces with two stable responses, and where simulations from rest and from sliding end."""
+    """Print, at 5 Hz, the forces with two stable responses, and where simulations end.
+
+    Simulations start from rest and from sliding.
+    """
     from test_describing import driven
 
     forces = np.arange(1.0, 2.51, 0.1)
@@ -92,7 +98,7 @@ def print_mass_line(rig: Stage) -> None:
 
 
 def print_balance(rigid: Stage) -> None:
-    """Print the harmonic balance by its highest harmonic, and the first series that has a solution."""
+    """Print the harmonic balance by its highest harmonic, and the first series that solves it."""
     print(harmonic_balance(rigid, CROSSOVERS).drop_vars("status").to_dataframe().to_string())
     series = harmonic_balance(rigid, CROSSOVERS, range(25, 131, 2))
     for crossover, row in zip(series["crossover"], series["status"].values, strict=True):

@@ -137,7 +137,10 @@ def _mass(flat: Mapping[str, Any]) -> float:
 
 
 def _screw(flat: Mapping[str, Any]) -> Rates:
-    """Return the rates of motor and load with play between them; PID, its derivative from the motor or the load."""
+    """Return the rates of motor and load with play between them, under a PID controller.
+
+    Its derivative is that of the motor or of the load.
+    """
     key = {name: flat[f"transmission.{name}"] for name in ("mass", "stiffness", "damping")}
     half, load_mass = flat.get("transmission.backlash", 0.0) / 2, _mass(flat)
     kp, ki, kd, tau = (flat[f"controller.{name}"] for name in ("kp", "ki", "kd", "tau"))
@@ -190,7 +193,7 @@ def settling(flat: Mapping[str, Any], within: float) -> float:
 
 
 def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
-    """Tune a machine, try working settings on fresh machines, and append a line for each to the file."""
+    """Tune a machine, try working settings on fresh machines, and append lines to the file."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     if not any(row["machine"] == name and "told" in row for row in rows):
         begun = process_time()
@@ -236,7 +239,7 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
 
 
 def table(file: Path) -> None:
-    """Print the settings with two fractions: the one that friso states, and the one by these equations.
+    """Print the settings with two fractions: by friso's statement, and by these equations.
 
     The latter is printed for each class of moves.
     """

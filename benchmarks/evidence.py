@@ -299,7 +299,7 @@ def old(entries: Mapping[str, Entry]) -> list[str]:
 
 
 def older_than_code(entries: Mapping[str, Entry]) -> list[str]:
-    """Return the names of entries that were computed with other criteria, methods or experiments."""
+    """Return the entries' names computed with other criteria, methods or experiments."""
     return [name for name, entry in entries.items() if entry.code != code_digest(entry.rests_on)]
 
 

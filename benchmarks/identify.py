@@ -98,7 +98,7 @@ class Answer:
 
 @dataclass
 class Count:
-    """Counts for a quantity: how often it was held or missed, with its half-widths over the truth.
+    """Counts for a quantity: how often it was held or missed, with relative half-widths.
 
     Further, how often it was not reported and its range was right, how often the motion shows it, and how often it was
     then reported.
@@ -133,7 +133,7 @@ def mass_of(flat: dict) -> float:
 
 
 def of_rigid(machine: Machine) -> Iterator[Answer]:
-    """Yield answers on a machine without joint: break-away, constant speeds, and frequency response."""
+    """Yield answers on a machine without joint: break-away, speeds, frequency response."""
     flat = machine.flat
     mass = mass_of(flat)
     yield Answer.of("break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"])
@@ -221,7 +221,7 @@ TASKS: Mapping[str, Callable[[int], Iterable[Answer]]] = {
 
 
 def run(tasks: Iterable[Task], kept: Path | None = None) -> list[Answer]:
-    """Return the answers on machines by task; the file `kept` stores them, and answers in it are reused."""
+    """Return the answers on machines by task; the file `kept` stores and supplies them."""
     before = _read(kept) if kept else {}
     every: list[Answer] = []
     for task in tasks:

@@ -1,10 +1,10 @@
-"""Test moves with effects outside the model: `python -m benchmarks.identify_effects [FAMILY ...]`.
+"""Test moves with effects outside the model.
 
-Machines drawn at random are simulated by a separate program (LuGre friction by an implicit step, and a sampled servo
-unknown to friso). Each has one effect that is in no stage file, of 10 % of the friction or more; some are sound.
-`--machines 5` sets their number in a family. For each family it prints how many logs were noticed (a doubt was raised,
-or the log refused), how many named the right cause first, how many reported values hold the truth, and how many were
-still reported. Sound logs show false alarms.
+Run by `python -m benchmarks.identify_effects [FAMILY ...]`. Machines drawn at random are simulated by a separate
+program (LuGre friction by an implicit step, and a sampled servo unknown to friso). Each has one effect that is in no
+stage file, of 10 % of the friction or more; some are sound. `--machines 5` sets their number in a family. For each
+family it prints how many logs were noticed (a doubt was raised, or the log refused), how many named the right cause
+first, how many reported values hold the truth, and how many were still reported. Sound logs show false alarms.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Effects:
 
 @njit(cache=True)
 def _run(reference, speed, p, step, parts):
-    """Return position [m] and force [N] at the samples, shape (n,), for the numbers `p` of a machine."""
+    """Return position [m] and force [N] at the samples, (n,), for a machine's numbers `p`."""
     mass, coulomb, static, stribeck, viscous, bristle, kp, kd, ki = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8]
     grows, place, cogging, pitch = p[9], p[10], p[11], p[12]
     load, stiffness, damping, play = p[13], p[14], p[15], p[16]
@@ -266,7 +266,7 @@ KEYS = {
 
 @dataclass
 class Outcome:
-    """Result for one log: doubts in words with their names, the first cause, values held and reported."""
+    """Result for one log: doubts in words with names, first cause, values held and reported."""
 
     family: str
     seed: int

@@ -100,7 +100,7 @@ def answer(folder: Path, count: int) -> None:
 
 
 def compared(own: str, other: str) -> tuple[bool, float]:
-    """Tell whether two texts have the same words, and the largest relative difference of their numbers.
+    """Tell whether two texts have equal words, and their numbers' largest relative difference.
 
     It is infinite if the words differ.
     """

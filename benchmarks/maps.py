@@ -1,7 +1,8 @@
-"""Time parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`.
+"""Time parameter studies at scale.
 
-Parts are all of the thesis's maps; a study of 10^6 runs; the cost per run from 10^3 to 10^6 runs; and the cells of the
-maps by SciPy's Radau with compiled functions on a process pool, extrapolated from a sample.
+Run by `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`. Parts are all of the thesis's maps; a study
+of 10^6 runs; the cost per run from 10^3 to 10^6 runs; and the cells of the maps by SciPy's Radau with compiled
+functions on a process pool, extrapolated from a sample.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def large_study(count: int, rtol: float) -> Study:
 
 
 def _untuned(stage: Stage) -> Stage:
-    """Return the stage with its controller tuned for cart and stage together, whatever they weigh."""
+    """Return the stage with its controller tuned for the mass of cart and stage together."""
     return stage.replace({"controller.tuned_mass": None})
 
 
@@ -125,7 +126,7 @@ def _often(count: int, repetitions: int) -> int:
 
 
 def run_overhead(blocks: int) -> list[Goal]:
-    """Measure the cost of a block besides its runs, with blocks of invalid cells, which need no run."""
+    """Measure the cost of a block besides its runs, with blocks of invalid cells."""
     rows = []
     axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
     study = Request(thesis_rig(), axes).study()
@@ -143,7 +144,7 @@ def run_overhead(blocks: int) -> list[Goal]:
 
 
 def run_peer(cells_per_map: int) -> list[Goal]:
-    """Run a sample of the cells of all maps by SciPy's Radau on a process pool, and extrapolate to all."""
+    """Run a sample of all maps' cells by SciPy's Radau on a process pool, and extrapolate."""
     rtol = RTOLS[0]
     jobs = [job for study in thesis_studies(rtol) for job in _sampled(study, cells_per_map)]
     with ProcessPoolExecutor() as pool:

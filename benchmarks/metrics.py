@@ -1,4 +1,4 @@
-"""Define what is compared: hunting peaks, the settled cycle, and distance from a reference trace."""
+"""Define what is compared: hunting peaks, settled cycle, distance from a reference."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COUNTED_AFTER, COUNTED_ABOVE, APART = 10.0, 1e-4, 0.5
 
 
 def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and heights [m] of the counted maxima among turning points, in order of time.
+    """Return times [s] and heights [m] of the counted maxima among turning points.
 
     `beyond` stands before the first and after the last value: with -inf the ends count, with inf they do not.
     """
@@ -27,7 +27,7 @@ def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tu
 
 
 def sampled_maxima(times: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the counted maxima of a sampled trace, each refined by a parabola through three samples."""
+    """Return the counted maxima of a sampled trace, refined by parabolas."""
     at_maxima, _ = maxima(times, position, np.inf)
     at = np.clip(np.searchsorted(times, at_maxima), 1, len(times) - 2)
     y0, y1, y2 = position[at - 1], position[at], position[at + 1]
@@ -55,7 +55,10 @@ def cycle(turns: tuple[np.ndarray, np.ndarray]) -> Cycle:
 
 @dataclass(frozen=True)
 class Distance:
-    """Errors of a trace [m]: largest in the first 0.1 s and over all, root mean square over all and after 10 s."""
+    """Errors of a trace [m]: largest early and over all, root mean square over all and late.
+
+    Early: in the first 0.1 s. Late: after 10 s.
+    """
 
     early: float
     largest: float

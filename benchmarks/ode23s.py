@@ -1,9 +1,9 @@
-"""Run the thesis's solver (Sec. 3.2.3) on its rig: MATLAB's ode23s at 1e-4, with steps up to 1e-4 s.
+"""Run the thesis's solver (Sec. 3.2.3) on its rig: MATLAB's ode23s at 1e-4.
 
-The method is that of Shampine and Reichelt (1997), The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, Sec. 3, with their
-control of the step. The absolute tolerance, which the thesis does not state, is Simulink's 1e-6 in every state. The
-equations of the rig are written here by hand, from Sec. 3.1 and 3.2 and Table 1 and 2: nothing of friso's equations or
-engine is used.
+Its steps are up to 1e-4 s. The method is that of Shampine and Reichelt (1997), The MATLAB ODE Suite, SIAM J. Sci.
+Comput. 18, Sec. 3, with their control of the step. The absolute tolerance, which the thesis does not state, is
+Simulink's 1e-6 in every state. The equations of the rig are written here by hand, from Sec. 3.1 and 3.2 and Table 1 and
+2: nothing of friso's equations or engine is used.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SAMPLE = 1e-3
 
 @njit
 def reference(t: float, acceleration: float, time: float, back: float) -> float:
-    """Return the reference of a move there and back; each half accelerates, then brakes for as long."""
+    """Return the reference of a move there and back; each half accelerates, then brakes."""
     if t >= back:
         return acceleration * time**2 - _moved(t - back, acceleration, time)
     return _moved(t, acceleration, time)
@@ -68,7 +68,7 @@ def rates(t: float, x: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
 
 @njit
 def ode23s(p: np.ndarray, end: float, rtol: float, atol: float, largest: float, sample: float) -> tuple:
-    """Solve from rest; return samples of the stage's position, (n,), and numbers of steps and rejected steps."""
+    """Solve from rest; return samples of the position, (n,), and counts of steps and rejections."""
     n, t, h = STATES, 0.0, 1e-6
     x, new, moved = np.zeros(n), np.zeros(n), np.zeros(n)
     f0, f1, f2, ft = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -192,7 +192,7 @@ def other_solvers() -> dict[str, float]:
 
 
 def _of_scipy(name: str, numbers: np.ndarray, end: float) -> tuple[np.ndarray, int, int]:
-    """Return samples of the stage's position, steps, and evaluations including those of Jacobians."""
+    """Return samples of the stage's position, steps, and evaluations with Jacobians."""
     from scipy.integrate import BDF, RK45
 
     def derivative(t: float, x: np.ndarray) -> np.ndarray:

@@ -1,9 +1,10 @@
-"""Compare friso on an emulated arm64 machine: `python -m benchmarks.other_machines STAGE.toml`.
+"""Compare friso on an emulated arm64 machine with friso here.
 
-It makes a Debian arm64 root (mmdebstrap), installs this checkout there as a wheel, runs a check and a map of 9 x 9 on
-both machines, and compares. All verdicts must be equal, and all numbers within `AGREEMENT`; otherwise the status is 1.
-It runs as root, on Debian with mmdebstrap, arch-test and qemu-user-static, with binfmt_misc mounted. An emulated
-processor is slow: the check of a rigid stage took 162 s there and 6 s here.
+Run by `python -m benchmarks.other_machines STAGE.toml`. It makes a Debian arm64 root (mmdebstrap), installs this
+checkout there as a wheel, runs a check and a map of 9 x 9 on both machines, and compares. All verdicts must be equal,
+and all numbers within `AGREEMENT`; otherwise the status is 1. It runs as root, on Debian with mmdebstrap, arch-test and
+qemu-user-static, with binfmt_misc mounted. An emulated processor is slow: the check of a rigid stage took 162 s there
+and 6 s here.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def answers(command: list[str], folder: Path) -> Answers:
 
 
 def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:
-    """Return what is compared, with its difference: counts for verdicts, relative differences for numbers."""
+    """Return the compared items with differences: counts for verdicts, relative for numbers."""
     verdicts = [[case["verdict"] for case in machine.check["cases"].values()] for machine in (here, there)]
     rows = [("verdicts of the check", str(sum(a != b for a, b in zip(*verdicts, strict=True))))]
     swings = here.runs["outcome"].values == "swings"

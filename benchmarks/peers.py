@@ -33,7 +33,7 @@ MANY = 10_000_000
 
 @dataclass(frozen=True)
 class Task:
-    """A stretch to integrate: rig, equations, rtol, the reference's rows, times [s] to report, start state."""
+    """A stretch to integrate: rig, equations, rtol, reference, times [s] to report, start."""
 
     rig: Rig
     equations: Compiled
@@ -157,7 +157,7 @@ def piecewise(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled:
 
 @dataclass
 class Run:
-    """Result of a peer: its better way, wall times [s], positions on the grid, steps, unsampled time [s]."""
+    """Result of a peer: its better way, times [s], positions, steps, unsampled time [s]."""
 
     form: str
     seconds: list[float]
@@ -207,7 +207,7 @@ def _timed(form: str, *arguments: Any) -> tuple[float, Any]:
 
 @contextmanager
 def time_out(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in the block after some seconds; it acts where Python code is called back."""
+    """Raise TimeoutError in the block after some seconds, where Python code is called back."""
 
     def stop(*_: object) -> None:
         raise TimeoutError

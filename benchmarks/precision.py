@@ -1,4 +1,4 @@
-"""Plot work against precision: time of one run against its error, over a range of tolerances."""
+"""Plot work against precision: time of a run against its error, over tolerances."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Curve = list[tuple[float, float, float, float]]
 
 
 def work_precision(places: list[Field], folder: Path, quick: bool) -> None:
-    """Print and draw the curves of all methods on all rigs; the plot is work_precision.png in `folder`."""
+    """Print and draw all methods' curves on all rigs, as work_precision.png in `folder`."""
     rtols = [10.0**-k for k in (range(3, 9, 2) if quick else range(3, 10))]
     curves = {place.rig.name: _curves(place, rtols) for place in places}
     for name, methods in curves.items():

@@ -1,4 +1,7 @@
-"""Run the feasibility prototype, `../shared/prototype/lanes.py`, if present; it is never copied here."""
+"""Run the feasibility prototype `../shared/prototype/lanes.py`, if present.
+
+It is never copied here.
+"""
 
 from __future__ import annotations
 

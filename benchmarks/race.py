@@ -30,7 +30,7 @@ CORES = usable_cores()
 
 @dataclass
 class Entry:
-    """One method on one rig: times per run and core [s], steps, rejected, cycle, errors, remarks."""
+    """One method on one rig: times per run and core [s], steps, cycle, errors, remarks."""
 
     name: str
     seconds: list[float]
@@ -42,7 +42,7 @@ class Entry:
 
 @dataclass
 class Field:
-    """Inputs of a race: rig, its equations for the peers, the peers, the prototype, the reference trace."""
+    """Inputs of a race: rig, equations for the peers, peers, prototype, reference trace."""
 
     rig: Rig
     equations: Compiled

@@ -16,7 +16,7 @@ from friso.platform.system import usable_cores
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal: its subject, the target, the measured value, and whether it is reached (None: information)."""
+    """A goal: subject, target, measured value, and whether it is reached (None: no goal)."""
 
     about: str
     target: str
@@ -58,7 +58,7 @@ def spread(seconds: Sequence[float], scale: float = 1.0, digits: int = 1) -> str
 
 
 def machine(libraries: Sequence[ModuleType]) -> str:
-    """Describe the machine: versions of libraries, processor, usable cores, and load of the last minute."""
+    """Describe the machine: libraries, processor, usable cores, and the last minute's load."""
     versions = [f"{library.__name__} {library.__version__}" for library in libraries]
     file = Path("/proc/cpuinfo")
     lines = file.read_text().splitlines() if file.exists() else []

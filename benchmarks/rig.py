@@ -1,8 +1,8 @@
-"""Time the real drive against the continuous loop, on the same stage: ``python -m benchmarks.rig``.
+"""Time the real drive against the continuous loop, on the same stage.
 
-It measures the time of one core per run in a sweep of examples/thesis_drive.toml with all its parts (delay, current
-loop, rail, cable, noise). Each run has its own rail; the joint is locked and free. Runs are made and logged as in the
-experiments of ``friso rig``.
+Run by ``python -m benchmarks.rig``. It measures the time of one core per run in a sweep of examples/thesis_drive.toml
+with all its parts (delay, current loop, rail, cable, noise). Each run has its own rail; the joint is locked and free.
+Runs are made and logged as in the experiments of ``friso rig``.
 """
 
 from __future__ import annotations

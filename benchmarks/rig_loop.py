@@ -1,10 +1,11 @@
-"""Test the way from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
+"""Test the way from rig to stage file.
 
-Machines drawn at random with their real drives (tests/rig_machines.py) go through the experiments of `friso rig`:
-frequency responses with the joint locked and free, steps, slow motion, and with the joint locked many speeds, slow
-sliding and small motion before sliding. Their logs are written as text, read back as `friso identify` does, and
-identified with what an owner knows as `--stage`. All but the free response make one stage file; the free response is
-identified separately, because a machine can be on one bench at a time.
+Run by `python -m benchmarks.rig_loop [--machines 100] [--first 0]`. Machines drawn at random with their real drives
+(tests/rig_machines.py) go through the experiments of `friso rig`: frequency responses with the joint locked and free,
+steps, slow motion, and with the joint locked many speeds, slow sliding and small motion before sliding. Their logs are
+written as text, read back as `friso identify` does, and identified with what an owner knows as `--stage`. All but the
+free response make one stage file; the free response is identified separately, because a machine can be on one bench at
+a time.
 
 For each experiment and quantity it prints how often the 95 % interval holds the truth; and how often `friso check` on
 the identified stage gives the machine's verdict. A machine has one rail. For an experiment, the true static and Coulomb
@@ -94,7 +95,7 @@ def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stag
 
 
 def on_its_rail(machine: Machine) -> Stage:
-    """Return the machine on an even rail with the mean friction of its own rail along the travel."""
+    """Return the machine on an even rail with the mean friction of its own rail."""
     factors = friction_factors(machine.flat, np.linspace(*travel(machine.truth), POINTS)).mean(axis=1)
     return machine.truth.with_numbers({key: machine.flat[key] * by for key, by in zip(LEVELS, factors, strict=True)})
 
@@ -138,7 +139,7 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
 
 
 def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> None:
-    """Count the verdicts on the identified stage against those on the machine, both on an even rail."""
+    """Count verdicts on the identified stage against those on the machine, on an even rail."""
     true, identified = check(on_its_rail(machine)), check(stage)
     for case, true_case in true.items():
         pair = true_case.verdict, identified[case].verdict

@@ -1,4 +1,4 @@
-"""Define the two rigs that are raced: the thesis rig with its joint locked and free, at 8 Hz."""
+"""Define the two raced rigs: the thesis rig with its joint locked and free, at 8 Hz."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ BEYOND = 1.3
 
 
 def axes() -> Iterator[tuple[str, Stage]]:
-    """Yield all axes: four structures of controller, three levels of friction, without and with the mode."""
+    """Yield all axes: four controllers, three levels of friction, without and with mode."""
     for level, mode in product(LEVELS, (False, True)):
         for name, controller in CONTROLLERS.items():
             stage = loads(AXIS + controller)
@@ -127,7 +127,10 @@ def brute(search: Search, count: int, most: float) -> float:
 
 
 def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure moves, margins and attractors, with sampling and delay of the stage `drive` for the margins."""
+    """Measure moves, margins and attractors; the stage `drive` gives sampling and delay.
+
+    Sampling and delay count for the margins.
+    """
     return moving(stage, machines, goal, drive).surveyed(stage, machines, goal)
 
 
@@ -157,7 +160,7 @@ def times_on(search: Search, shares: np.ndarray, machine: Fleet, most: float) ->
 
 
 def thesis() -> None:
-    """Tune the thesis's rig at 8 Hz: bandwidth and isolator with their costs, and its own design (Sec. 3.4)."""
+    """Tune the thesis's rig at 8 Hz: bandwidth, isolator, and its own design (Sec. 3.4)."""
     rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
     locked, free = rig.replace({"joint.locked": True}), rig.replace({"joint.locked": False})
     goal = Goal(bandwidth_limit=25.0)

@@ -24,7 +24,7 @@ MOST_REJECTED = 0.15
 
 @dataclass(frozen=True)
 class Map:
-    """A map: name, rig with its equations, friso's flat form of all cells, the prototype's, wanted agreement."""
+    """A map: name, rig, equations, friso's flat form, the prototype's, wanted agreement."""
 
     name: str
     rig: Rig
@@ -122,7 +122,7 @@ def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) ->
 def _times(
     case: Map, prototype: ModuleType | None, lanes: list[Any], rtol: float, repetitions: int
 ) -> dict[str, list[float]]:
-    """Return wall times [s] of friso, friso with all measures, and the prototype, taken in turns."""
+    """Return wall times [s] of friso, friso with all measures, and the prototype."""
     jobs: dict[str, Any] = {
         "friso": lambda: friso_map(case, rtol),
         "measured": lambda: _measured_map(case, rtol),

@@ -1,1 +1,1 @@
-"""Test random stages under each friction law: cycles, multipliers and edges against SciPy and brute force."""
+"""Test random stages under each friction law against SciPy and brute force."""

@@ -1,8 +1,9 @@
-"""Test random stages under each friction law: `python -m benchmarks.laws --law gms --stages 20`.
+"""Test random stages under each friction law.
 
-Every stage is checked. SciPy's Radau follows its cycles event by event with equations written by hand (closing,
-amplitude, multiplier), and simulations follow them at two tolerances. Brute force attacks its verdict, its own motion
-and its edge (`benchmarks.truth`). Errors are printed; records go to a file, and stages in it are not repeated.
+Run by `python -m benchmarks.laws --law gms --stages 20`. Every stage is checked. SciPy's Radau follows its cycles event
+by event with equations written by hand (closing, amplitude, multiplier), and simulations follow them at two tolerances.
+Brute force attacks its verdict, its own motion and its edge (`benchmarks.truth`). Errors are printed; records go to a
+file, and stages in it are not repeated.
 """
 
 from __future__ import annotations

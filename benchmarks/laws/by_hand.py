@@ -1,7 +1,7 @@
-"""Write stages under laws with several kinds of bristle by hand, from the papers, event by event.
+"""Write stages under laws with several kinds of bristle by hand, from the papers.
 
-SciPy's Radau is stopped where the velocity passes zero, an element reaches its limit, or the stroke limiter is touched
-or left. Only the names of keys are shared with friso.
+They run event by event. SciPy's Radau is stopped where the velocity passes zero, an element reaches its limit, or the
+stroke limiter is touched or left. Only the names of keys are shared with friso.
 """
 
 from __future__ import annotations
@@ -108,7 +108,10 @@ class Stage:
         return surfaces
 
     def _lacks(self, y: np.ndarray, n: int, way: float, body: int) -> float:
-        """Return by how much the force of an element along the motion is below its share of the level [N]."""
+        """Return by how much an element's force is below its share of the level [N].
+
+        The force is that along the motion.
+        """
         stiffness, share, _ = self.elements
         return float(share[n] * _level(y[body], self.numbers) - way * stiffness[n] * y[BRISTLES + n])
 

@@ -1,4 +1,7 @@
-"""Draw stages at random under a friction law: those of `benchmarks.truth` with LuGre, friction replaced."""
+"""Draw stages at random under a friction law, from those of `benchmarks.truth`.
+
+Only the friction is replaced.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +23,12 @@ ELEMENTS = {"rigid": 4, "free": 2, "locked": 6}
 
 
 def numbers(stages: int) -> list[int]:
-    """Return the numbers of the first stages with LuGre friction, a van Dijk controller and nothing else."""
+    """Return the numbers of the first stages with LuGre friction and van Dijk controller alone."""
     return list(islice((n for n in count() if FORMS[n % len(FORMS)] in JOINTS), stages))
 
 
 def under(law: str, seed: int, number: int) -> Stage:
-    """Return the stage with a number under a law, with a shape before sliding drawn for that law."""
+    """Return the numbered stage under a law, with a shape before sliding drawn for it."""
     stage, rng = draw(seed, number), np.random.default_rng([seed, number, 11])
     joint = FORMS[number % len(FORMS)].joint
     measured = friction_law("lugre").shown(stage.flat())

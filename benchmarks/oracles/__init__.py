@@ -1,1 +1,4 @@
-"""Compare friso's answers with facts about hunting from other sources: `python -m benchmarks.oracles`."""
+"""Compare friso's answers with facts about hunting from other sources.
+
+Run by `python -m benchmarks.oracles`.
+"""

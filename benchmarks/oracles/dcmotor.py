@@ -36,14 +36,14 @@ MODEL = """<mujoco><option timestep="{step!r}" gravity="0 0 0" integrator="Euler
 
 
 def crossings(times: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Return the times [s] at which the speed passes `SPEED` upward, interpolated between samples."""
+    """Return the times [s] at which the speed passes `SPEED` upward, interpolated."""
     at = np.flatnonzero((speed[:-1] < SPEED) & (speed[1:] >= SPEED))
     return times[at] + (SPEED - speed[at]) / (speed[at + 1] - speed[at]) * np.diff(times)[at]
 
 
 @cache
 def by_mujoco(step: float) -> tuple[float, float, float]:
-    """Return the first passage [s], the time from it to the next [s], and the top speed [m/s], by MuJoCo."""
+    """Return first passage [s], time to the next [s], and top speed [m/s], by MuJoCo."""
     try:
         mujoco = import_module("mujoco")  # only compared with
     except ImportError as missing:
@@ -62,7 +62,7 @@ def by_mujoco(step: float) -> tuple[float, float, float]:
 
 @cache
 def by_friso() -> tuple[float, float, float]:
-    """Return the first passage [s], the time from it to the next [s], and the top speed [m/s], by friso."""
+    """Return first passage [s], time to the next [s], and top speed [m/s], by friso."""
     response = friso.simulate(friso.load(EXAMPLE), 1e-9, 1e-4)
     time, speed = response["time"].to_numpy(), response["velocity"].to_numpy()
     first, second = crossings(time[time < END], speed[time < END])

@@ -80,7 +80,7 @@ def kept() -> list[Record]:
 
 
 def grow(seconds: float) -> None:
-    """Add stages to the file, for some seconds [s] or until every class has enough stages with an edge.
+    """Add stages to the file for some time [s], or until every class has enough edges.
 
     Stages without an edge stay in the file. A stage in the file is not done again.
     """
@@ -112,7 +112,7 @@ def edges_of(quota: Quota, records: Iterable[Record]) -> int:
 
 
 def _written(series: str, forms: tuple[int, ...]) -> Iterator[tuple[str, int]]:
-    """Yield series and number of stages with integral action whose equations are written by hand."""
+    """Yield series and number of stages with integral action and equations by hand."""
     for number in count():
         if number % len(SERIES[series]) not in forms:
             continue

@@ -165,7 +165,7 @@ def same_edge(record: Record, said: Record) -> bool:
 
 
 def beyond(record: Record, said: Record) -> list[float]:
-    """Return bandwidths beyond friso's edge at which runs keep swinging although friso has no attractor."""
+    """Return bandwidths beyond friso's edge at which runs swing without an attractor of friso."""
     if not said["edge"]:
         return []
     factors = [float(factor) for factor, word in record["words"].items() if word == SWINGS]

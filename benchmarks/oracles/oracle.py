@@ -12,7 +12,7 @@ class NotInstalled(Exception):
 
 @dataclass(frozen=True)
 class Finding:
-    """An answer of friso beside that of an oracle: the question, both answers in words, whether they agree.
+    """An answer of friso beside an oracle's: question, both in words, whether they agree.
 
     None stands for neither: friso or the oracle leaves it open.
     """

@@ -127,7 +127,7 @@ class Orbit:
 
     @property
     def multipliers(self) -> np.ndarray:
-        """Return the multipliers of the map from one passage to the next on this orbit, the largest first."""
+        """Return the multipliers of this orbit's map from passage to passage, largest first."""
         values = np.linalg.eigvals(self.map_derivative())
         return values[np.argsort(-np.abs(values))]
 
@@ -210,7 +210,7 @@ def passing(crossover: float, state: np.ndarray, time: float, sign: float) -> Or
 
 
 def located(guess: Orbit, multiplier: float) -> Orbit:
-    """Return the orbit near a guess whose multiplier has a given value, 1 at a fold and -1 at a flip.
+    """Return the orbit near a guess with a given multiplier, 1 at a fold, -1 at a flip.
 
     Secants vary the speed at the passage, which continues around a fold.
     """

@@ -1,4 +1,4 @@
-"""Write the page of oracles: a table of all, and a section for each on what agrees and what does not."""
+"""Write the page of oracles: a table of all, and a section for each."""
 
 from __future__ import annotations
 

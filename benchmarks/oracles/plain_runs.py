@@ -79,7 +79,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Plain:
-    """A stage with its reference held at 0: equations by hand, and friction at the motor (all 0: none)."""
+    """A stage with its reference at 0, by hand, with friction at the motor (all 0: none)."""
 
     equations: ByHand
     second: np.ndarray
@@ -148,7 +148,10 @@ class Plain:
         return np.append(self.equations.start(displacement), 0.0)
 
     def stuck(self, displacement: float) -> np.ndarray:
-        """Return a start at rest at a displacement [m], with the integral balancing the proportional force."""
+        """Return a start at rest at a displacement [m], with the integral in balance.
+
+        It balances the proportional force.
+        """
         y = self.released(displacement)
         if self._number("tuned") or (self._number("tau") and self._number("on_error")):
             y[LOW] = -displacement

@@ -1,4 +1,4 @@
-"""Compare with the servo of the LuGre paper: it hunts with its integral gain, and not without."""
+"""Compare with the servo of the LuGre paper, which hunts only with its integral gain."""
 
 from __future__ import annotations
 

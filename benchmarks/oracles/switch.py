@@ -77,7 +77,7 @@ class Pid:
         return np.linspace(0.0, LONG / self.omega, 6001)
 
     def stop(self, distance: float, gap: float) -> np.ndarray:
-        """Return place [m], speed and acceleration at the next stop, NaN if the mass creeps home instead.
+        """Return place [m], speed and acceleration at the next stop; NaN for creeping home.
 
         The mass stuck at a distance [m] above its reference and broke away downward, with an acceleration of -gap/mass.
         """
@@ -183,7 +183,10 @@ def always() -> Iterator[Finding]:
 
 
 def at_the_limit(answers: Sequence[Hunting], sharpness: float) -> Iterator[Finding]:
-    """Yield stages for which friso is certain of another number of attractors than the one exact cycle."""
+    """Yield stages for which friso is certain of more or fewer attractors than one cycle.
+
+    The exact solution has one.
+    """
     motions = [len(a.surveyed.motions) if a.certain and a.surveyed else 1 for a in answers]
     for words, wrong in (("nothing", np.equal(motions, 0)), ("more than one motion", np.greater(motions, 1))):
         which = ", ".join(f"PID {k}" for k in np.flatnonzero(wrong))
@@ -211,9 +214,9 @@ def surveyed(one: Stage) -> float:
 
 
 def closed(one: Stage) -> float:
-    """Return half of peak to peak [m] of the cycle that friso closes at a fixed point of its return map.
+    """Return half of peak to peak [m] of the cycle that friso closes at a fixed point.
 
-    NaN without one.
+    The fixed point is one of its return map. NaN without one.
     """
     return float(find_cycles(Ensemble.held(one.flat(), 1)).amplitude[0])
 

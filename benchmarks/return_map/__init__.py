@@ -1,1 +1,4 @@
-"""Compare what the return map and the search show about hunting: `python -m benchmarks.return_map`."""
+"""Compare what the return map and the search show about hunting.
+
+Run by `python -m benchmarks.return_map`.
+"""

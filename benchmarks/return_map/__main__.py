@@ -1,8 +1,9 @@
-"""Compare the check with the search alone, without return maps: `python -m benchmarks.return_map`.
+"""Compare the check with the search alone, without return maps.
 
-Stages are drawn from three series, or are the hard stages of the suite (`--series hard`) or the thesis rig (`--series
-rig`). Both methods answer each case. Answers are kept in a file, a line each, and a run continues where one was
-stopped. `--table` writes the page [The check against the search alone](return-map.md).
+Run by `python -m benchmarks.return_map`. Stages are drawn from three series, or are the hard stages of the suite
+(`--series hard`) or the thesis rig (`--series rig`). Both methods answer each case. Answers are kept in a file, a line
+each, and a run continues where one was stopped. `--table` writes the page [The check against the search
+alone](return-map.md).
 """
 
 from __future__ import annotations

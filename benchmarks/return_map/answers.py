@@ -1,4 +1,4 @@
-"""Convert a check's results to data: by the return map where it decides, or by the search alone."""
+"""Convert a check's results to data, by the return map or by the search alone."""
 
 from __future__ import annotations
 

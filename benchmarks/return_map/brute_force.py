@@ -20,7 +20,7 @@ STARTS = 24, 12, 24, 12
 
 
 def decided(record: dict[str, Any], stage: Stage) -> str:
-    """Return what keeps swinging where the answers differ: at the stage's bandwidth, or between both edges."""
+    """Return what swings where the answers differ: at the stage's bandwidth, or between edges."""
     search, by_map = record["searched"], record["mapped"]
     if not by_map["certain"] or not search["certain"]:
         return ""

@@ -1,4 +1,4 @@
-"""Compare the check with the search alone, counted by class of machine, as a page of Markdown."""
+"""Compare the check with the search alone by class of machine, as a Markdown page."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def same_verdict(record: Record) -> bool:
 
 
 def same_edge(record: Record) -> bool:
-    """Tell whether the search's edge lies in an interval of the check, within the search's own error."""
+    """Tell whether the search's edge, within its error, lies in an interval of the check."""
     edge, by_map = record["searched"]["edge"], record["mapped"]
     ends = [by_map["edge"], *(high for _, high in by_map["windows"])]
     reserve = edge["reserve"] + 1e-3

@@ -1,8 +1,8 @@
-"""Test damaged files, kills, interrupts, full disks: `python -m benchmarks.trust [CAMPAIGN ...]`.
+"""Test damaged files, kills, interrupts, full disks.
 
-Every failure is printed with what repeats it alone: the campaign, its seed, and the number of the case. The work is
-bounded in count (`--cases` for each campaign of light cases, a fraction of it for heavier ones) and in time
-(`--minutes` in all).
+Run by `python -m benchmarks.trust [CAMPAIGN ...]`. Every failure is printed with what repeats it alone: the campaign,
+its seed, and the number of the case. The work is bounded in count (`--cases` for each campaign of light cases, a
+fraction of it for heavier ones) and in time (`--minutes` in all).
 """
 
 from __future__ import annotations

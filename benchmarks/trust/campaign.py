@@ -53,7 +53,7 @@ HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "op
 
 @dataclass(frozen=True)
 class Part:
-    """Results of cases: how many were run, the numbers of failed ones with reasons, and why others could not be run."""
+    """Results of cases: number run, failed ones with reasons, and why others were not run."""
 
     count: int
     failures: list[tuple[int, str]]

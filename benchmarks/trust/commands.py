@@ -183,13 +183,19 @@ def read_only(rng: random.Random, folder: Path) -> None:
 
 
 def _without_root_s_rights() -> list[str]:
-    """Return what to put before a command so that permissions apply to it: root may write everywhere."""
+    """Return what to put before a command so that permissions apply.
+
+    Root may write everywhere.
+    """
     rights = "-dac_override,-dac_read_search,-fowner"
     return ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []
 
 
 def two_at_once(rng: random.Random, folder: Path) -> None:
-    """Run two maps on one store with an empty cache: one runs, the other is refused or finds all done."""
+    """Run two maps on one store with an empty cache: one runs, the other is refused or done.
+
+    The other may find all cells done.
+    """
     environ = {**os.environ, "FRISO_CACHE_DIR": str(folder / "cache")}
     first = _started(folder, MAP, environ)
     time.sleep(rng.uniform(0.0, 3.0))
@@ -218,7 +224,7 @@ def without_workers(rng: random.Random, folder: Path) -> None:
 
 
 def without_scheduler(rng: random.Random, folder: Path) -> None:
-    """End the scheduler while a map runs on it: there must be one sentence, and a resumed run without it."""
+    """End the scheduler while a map runs: one sentence is due, and a run that resumes."""
     place = folder / "scheduler.json"
     with subprocess.Popen([sys.executable, "-c", SCHEDULER, str(place)], stderr=subprocess.DEVNULL) as scheduler:
         while not place.exists() and scheduler.poll() is None:

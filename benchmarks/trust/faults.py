@@ -59,9 +59,9 @@ def _hook(event: str, arguments: tuple[Any, ...]) -> None:
 
 @contextmanager
 def fault(folder: Path, number: int, strike: Callable[[], None], lasting: bool = False) -> Iterator[None]:
-    """Call `strike` within the block before a numbered operation that creates something in a folder.
+    """Call `strike` in the block before a numbered operation that creates something.
 
-    Operations count from 1.
+    The operation is one in a folder. Operations count from 1.
     """
     global _fault
     _install()

@@ -1,4 +1,4 @@
-"""Provide inputs for commands and functions of the campaigns: friso's examples, and a log in a folder."""
+"""Provide inputs for the campaigns' commands: friso's examples, and a log."""
 
 from __future__ import annotations
 

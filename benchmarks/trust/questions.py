@@ -1,4 +1,4 @@
-"""Test what a page of `friso app` sends, with parts of other types, damaged, or out of range.
+"""Test what a page of `friso app` sends: other types, damaged, or out of range.
 
 Each question must be answered, or refused in one clear message. Nothing is computed.
 """

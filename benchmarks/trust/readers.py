@@ -1,4 +1,4 @@
-"""List what friso reads: an intact example of each kind of file, and the function that reads it.
+"""List what friso reads: an intact example of each file, and its reader.
 
 The function may refuse the file with an InputError and must do nothing else.
 """
@@ -122,7 +122,7 @@ def _texts() -> list[bytes]:
 
 
 def _binaries(kind: str) -> list[bytes]:
-    """Return files as measuring programs write them, made by the tests: four kinds of MAT, TDMS, UFF, LVM."""
+    """Return files of measuring programs, made by the tests: MAT (four kinds), TDMS, UFF, LVM."""
     motion = log_files.motion(200)
     time, names = motion["time"], ("position", "force")
     plain = {name: motion[name] for name in names}

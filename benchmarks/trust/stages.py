@@ -87,7 +87,7 @@ def _stage(tables: dict[str, Any]) -> Stage | None:
 
 
 def _mend(tables: dict[str, Any], error: friso.InputError) -> bool:
-    """Set what the error's example sets, or else leave out what is wrong; tell whether either was possible."""
+    """Set what the error's example sets, or leave out what is wrong; tell if either worked."""
     name, _, key = error.key.partition(",")[0].partition(".")
     table = tables.get(name)
     if not isinstance(table, dict):

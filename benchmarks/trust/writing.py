@@ -63,7 +63,7 @@ def files(rng: random.Random, folder: Path) -> None:
 
 
 def stores(rng: random.Random, folder: Path) -> None:
-    """Damage a store: it must say so, and be mended by the next run or refused, never show other numbers."""
+    """Damage a store: it must say so, and be mended or refused, never show other numbers."""
     path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
     what = _damage(path, rng)
     try:
@@ -145,7 +145,7 @@ def store_exchanges(rng: random.Random, folder: Path) -> None:
 
 
 def store_versions(rng: random.Random, folder: Path) -> None:
-    """Open an intact store of another version: it must be refused or read as it says, and not changed."""
+    """Open an intact store of another version: it must be refused or read, not changed."""
     path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
     document = json.loads((path / ".zmetadata").read_bytes())
     own, attributes = document["friso"], document["metadata"][".zattrs"]

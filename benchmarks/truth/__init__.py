@@ -1,1 +1,4 @@
-"""Try to refute friso's verdicts: `python -m benchmarks.truth` draws stages, checks and attacks them."""
+"""Try to refute friso's verdicts on drawn stages.
+
+Run by `python -m benchmarks.truth`.
+"""

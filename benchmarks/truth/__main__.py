@@ -1,9 +1,9 @@
-"""Draw stages, check them, and try to refute every verdict and edge: `python -m benchmarks.truth`.
+"""Draw stages, check them, and try to refute every verdict and edge.
 
-It prints by class of machine how many verdicts and edges are certain and how many of these are wrong (their stage
-files, each with a note, are written to a folder), the CPU time of a check, and why others are not certain. Attacks are
-kept in a file, and a run continues where one was stopped; when interrupted, it prints what there is. `--number` takes
-single stages of a seed; `--checks` only checks them, and keeps nothing.
+Run by `python -m benchmarks.truth`. It prints by class of machine how many verdicts and edges are certain and how many
+of these are wrong (their stage files, each with a note, are written to a folder), the CPU time of a check, and why
+others are not certain. Attacks are kept in a file, and a run continues where one was stopped; when interrupted, it
+prints what there is. `--number` takes single stages of a seed; `--checks` only checks them, and keeps nothing.
 """
 
 from __future__ import annotations

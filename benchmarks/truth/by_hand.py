@@ -1,10 +1,10 @@
-"""Write a stage's equations by hand, for SciPy, sharing only the reading of the stage file with friso.
+"""Write a stage's equations by hand, for SciPy.
 
-Sources: thesis, Eq. 3 to 8 and Fig. 3; LuGre: doi:10.1109/9.376053; regularised Stribeck friction:
-doi:10.1016/0005-1098(94)90209-7; Dahl 1968; active disturbance rejection with its observer:
-doi:10.1007/s11768-023-00129-y; leaks and limits of integrals: docs/controllers.md. There are no events: the solver's
-own error control finds every kink. (Settings that act within a window of the error are left out, because the solver
-steps over windows that a motion passes fast.)
+Only the reading of the stage file is shared with friso. Sources: thesis, Eq. 3 to 8 and Fig. 3; LuGre:
+doi:10.1109/9.376053; regularised Stribeck friction: doi:10.1016/0005-1098(94)90209-7; Dahl 1968; active disturbance
+rejection with its observer: doi:10.1007/s11768-023-00129-y; leaks and limits of integrals: docs/controllers.md. There
+are no events: the solver's own error control finds every kink. (Settings that act within a window of the error are left
+out, because the solver steps over windows that a motion passes fast.)
 """
 
 from __future__ import annotations
@@ -112,7 +112,10 @@ class ByHand:
 
     @property
     def wait(self) -> float:
-        """Return the time [s] in which the integrator winds up to break-away, for a stage stuck at `length`."""
+        """Return the time [s] in which the integrator of a stage stuck at `length` winds up.
+
+        It winds up to break-away.
+        """
         n = dict(zip(NAMES, self.numbers, strict=True))
         return float(n["kp"] / n["ki"]) if n["ki"] else np.inf
 

@@ -1,7 +1,7 @@
-"""Draw stages at random: all structures, laws and controllers, log-uniform over realistic ranges.
+"""Draw stages at random: all structures, laws and controllers.
 
-A numbered stage does not depend on what else is drawn. Structures come from a pool, each of whose members is a kernel
-to compile: numbers that differ by the size of the pool share one.
+Numbers are log-uniform over realistic ranges. A numbered stage does not depend on what else is drawn. Structures come
+from a pool, each of whose members is a kernel to compile: numbers that differ by the size of the pool share one.
 """
 
 from __future__ import annotations
@@ -278,7 +278,10 @@ class _Draw:
         return {"transmission": table, "encoder": {"position": side, "velocity": side}}
 
     def cascade(self) -> dict[str, Any]:
-        """Draw a velocity loop, with an integral as slow as a few of its own times, and a slower position loop."""
+        """Draw a velocity loop with integral, and a slower position loop.
+
+        The integral is as slow as a few of the velocity loop's times.
+        """
         return {
             "kind": "cascade",
             "kv": _text(self.omega * self.log(0.1, 0.6), "1/s"),
@@ -288,7 +291,7 @@ class _Draw:
         }
 
     def filters(self) -> list[dict[str, Any]]:
-        """Draw a notch on the force, and a low-pass filter in the feedback, both above the crossover."""
+        """Draw a notch on the force and a low-pass in the feedback, both above the crossover."""
         notch, low_pass = (max(self.crossover * self.log(6.0, 40.0), 50.0) for _ in range(2))
         return [
             {"kind": "notch", "frequency": _text(notch, "Hz"), "width": _text(0.4 * notch, "Hz"), "depth": 0.9},
@@ -366,7 +369,7 @@ class _Draw:
         }
 
     def motion(self) -> dict[str, Any]:
-        """Draw a move of any kind, from a fraction of the deflection by friction to a thousand of it."""
+        """Draw a move of any kind, from a fraction of the deflection by friction to a thousand."""
         kind = str(
             self.rng.choice(["there_and_back", "release", "step", "hold", "ramp"], p=[0.5, 0.18, 0.14, 0.12, 0.06])
         )

@@ -1,4 +1,4 @@
-"""Keep attacks in a file, a line of JSON each, so that many stages can be attacked in several runs."""
+"""Keep attacks in a file, a line of JSON each, so that later runs continue."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class KeptAttacks:
             self.records[key] = record
 
     def add(self, record: Record) -> Record:
-        """Append an attack to the file, with the code version and the day; it is on disk when this returns."""
+        """Append an attack to the file, with code version and day; it is on disk on return."""
         record = record | {"code": code_version(), "day": date.today().isoformat()}
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("ab+", buffering=0) as stream:

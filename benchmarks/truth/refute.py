@@ -64,8 +64,10 @@ SCIPY_PERIODS, ALIKE = 20.0, 0.03
 
 @dataclass(frozen=True)
 class Refutation:
-    """Which claim is wrong ("verdict", "own motion", "kicks", "edge" or "static friction"), and how that was
-    established."""
+    """A refuted claim, and the evidence against it.
+
+    `of` is "verdict", "own motion", "kicks", "edge" or "static friction".
+    """
 
     of: str
     sure: bool
@@ -114,16 +116,16 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 
 
 def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool:
-    """Tell whether any start keeps swinging, or may: first the claimed kicks, then the whole trial."""
+    """Tell whether any start may keep swinging: first the claimed kicks, then the trial."""
     trials = (bench.released(np.array(kicks)), trial) if kicks else (trial,)
     runs = (bench.follow(begun, rtol) for rtol in (ROUGH, FINE) for begun in trials)
     return any(np.isin(run.words.astype(str), (SWINGS, UNSURE)).any() for run in runs)
 
 
 def swinging(bench: Bench, trial: Trial) -> str:
-    """Return from which start, and how, a stage keeps swinging, as its neighbours do; "" if it does not.
+    """Return from which start, and how, a stage keeps swinging; "" if it does not.
 
-    The text includes SciPy's answer.
+    Its neighbours swing as well. The text includes SciPy's answer.
     """
     few = np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int))
     for rtol, begun in ((ROUGH, trial), (FINE, trial.take(few))):
@@ -206,7 +208,7 @@ _PLACES = {
 
 
 def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
-    """Test whether the stage's own motion can be followed for long although it is said to diverge."""
+    """Test whether the stage's own motion can be followed although it is said to diverge."""
     words = {rtol: str(bench.follow_own(rtol).words[0]) for rtol in (ROUGH, FINE)}
     if any(word != FAILED for word in words.values()):
         why = ", ".join(f"{word} at {rtol:g}" for rtol, word in words.items())
@@ -245,7 +247,7 @@ def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
 
 
 def _edge(claim: Claim, edge: Edge, seed: int) -> Iterator[Refutation]:
-    """Test that nothing attracts beyond the edge, except in stated windows, and something does before it."""
+    """Test that nothing attracts beyond the edge, except in windows, and something before it."""
     end, nearest = edge.factor, edge.beyond / edge.factor
     benches = [Bench(at(claim, end * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)

@@ -1,4 +1,4 @@
-"""Test verdicts by SciPy alone, with the equations by hand: the stage's own motion and some releases."""
+"""Test verdicts by SciPy alone, with equations by hand: own motion and some releases."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
 
 
 def ends_so(equations: ByHand, start: np.ndarray, word: str) -> bool:
-    """Tell whether a word of `swings` describes what becomes of a stage from a state, at both tolerances."""
+    """Tell whether a word of `swings` describes a stage's end from a state.
+
+    Both tolerances must agree.
+    """
     return all(followed(equations, start, rtol) == word for rtol in TWICE)
 
 

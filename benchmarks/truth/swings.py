@@ -24,7 +24,7 @@ then), and fewest legs of a swing in the last quarter."""
 
 @dataclass(frozen=True)
 class Legs:
-    """The largest legs of the third and of the last quarter of a run [m], and the number of large legs in the last."""
+    """Largest legs of the third and last quarter [m], and the number of large legs at last."""
 
     before: float
     last: float
@@ -44,7 +44,7 @@ def legs(times: np.ndarray, values: np.ndarray, end: float) -> Legs:
 
 
 def judge(seen: Legs, spread: float, small: float, patient: bool) -> str:
-    """Return the word for a run from its legs, and from the spread [m] of its deviation in the last quarter.
+    """Return the word for a run from its legs and the spread [m] of its last quarter.
 
     A spread below `small` [m] is rest. `patient`: the run will not be followed longer.
     """

@@ -1,4 +1,4 @@
-"""Count what attacks show, for all stages and by class of machine, as data, as text and in Markdown."""
+"""Count what attacks show, in total and by class of machine, as data, text and Markdown."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def print_tally(records: Sequence[Record], tally: dict[str, Any]) -> None:
 
 
 def page(records: Sequence[Record], tally: dict[str, Any]) -> str:
-    """Return the tables in Markdown: each series and seed by code version, then all by class of machine."""
+    """Return Markdown tables: series and seeds by code version, then all by class."""
     groups: dict[tuple[str, int, str], list[Record]] = {}
     for record in records:
         groups.setdefault((record["series"], record["seed"], record["code"]), []).append(record)

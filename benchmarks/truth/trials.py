@@ -1,4 +1,4 @@
-"""Simulate by brute force: a stage started in many ways and followed for long, in the engine's lanes."""
+"""Simulate by brute force: many starts of a stage, followed for long in the engine."""
 
 from __future__ import annotations
 
@@ -55,7 +55,10 @@ BUDGET = 100_000_000
 
 @dataclass(frozen=True)
 class Trial:
-    """Starts of one stage, (starts, states), with their kinds and their displacements [m] or velocities [m/s]."""
+    """Starts of one stage, (starts, states), with kinds and displacements or velocities.
+
+    They are in [m] or [m/s].
+    """
 
     states: np.ndarray
     kinds: tuple[str, ...]
@@ -91,7 +94,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Bench:
-    """A stage given as flat keys, with its reference held at 0 unless its own motion is followed.
+    """A stage as flat keys, with its reference at 0 unless its own motion is followed.
 
     A claimed `swing` [m], half of peak to peak, does not count as rest.
     """
@@ -215,7 +218,10 @@ class Bench:
         return True
 
     def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
-        """Return what becomes of the stage's own motion, run for a multiple of its duration, and for `ROUNDS`."""
+        """Return the end of the stage's own motion, run for a multiple of its duration.
+
+        It is then run for `ROUNDS`.
+        """
         periods = max(ROUNDS[0], min(longest * self.flat["motion.duration"] / self.period, ROUNDS[1]))
         corner = float(np.max(last_corner(dict(self.flat))))
         return self._follow(self.flat, None, corner, rtol, (periods, *ROUNDS[1:]), False)

@@ -54,7 +54,10 @@ _OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
 
 
 def _subject(panel: Panel) -> tuple[str, str, str]:
-    """Return title and axis labels of a panel, without the part of the title that belongs to one machine."""
+    """Return title and axis labels of a panel.
+
+    The part of the title that belongs to one machine is left out.
+    """
     return _OWN.sub("", panel.title), panel.x.label, panel.y.label
 
 

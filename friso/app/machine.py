@@ -1,4 +1,4 @@
-"""Hold the machine that a page shows: a stage file, and the keys changed since it was opened."""
+"""Hold the machine that a page shows: a stage file, and the keys changed since."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _has(tables: Mapping[str, Any], key: str) -> bool:
 
 
 def machine_on_page(machine: Machine) -> dict[str, Any]:
-    """Return what the page shows of a machine: its tables and keys in the order of the stage file."""
+    """Return what the page shows of a machine: its tables and keys in the file's order."""
     stage = machine.stage
     flat, written, uncertain = stage.flat(), stage.as_written(), stage.uncertain()
     fields, tables = numeric_keys(flat), []

@@ -113,7 +113,7 @@ def words_of(answer: Answer) -> AnswerPart:
 
 
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the keys of the machine, the metrics of maps, and the questions of installed packages."""
+    """Yield the machine's keys, the metrics of maps, and questions of installed packages."""
     asked.chosen()
     others = [{"id": name, "label": name.replace("-", " ").capitalize()} for name in others_of_stages()]
     in_order = sorted(metrics().items(), key=lambda item: not item[1].words)  # metrics in words first

@@ -21,7 +21,7 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A candidate evaluated by the beam model: drive stiffness [N/m] and first interfering frequency [Hz].
+    """A candidate by the beam model: drive stiffness [N/m], first interfering frequency [Hz].
 
     Both are NaN if the model could not be evaluated; `failure` gives the reason.
     """

@@ -1,4 +1,4 @@
-"""Choose the controller of a design: crossover, gains and margins, and whether more joint damping would help."""
+"""Choose a design's controller, and whether more joint damping would help."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ RATIOS = np.geomspace(0.02, 0.7, 9)
 
 @dataclass(frozen=True)
 class Damping:
-    """Joint dampings that were tried [N s/m], with the least modulus margin of each (0: unstable).
+    """Joint dampings that were tried [N s/m], and each one's least modulus margin.
 
-    The stage's own damping comes first.
+    The margin is 0 for an unstable loop. The stage's own damping comes first.
     """
 
     tried: np.ndarray

@@ -118,7 +118,7 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tell which corners hunt, or may hunt, at logarithms of crossovers, and for which that is certain."""
+    """Tell which corners hunt or may hunt at logarithms of crossovers, and how certainly."""
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)

@@ -97,7 +97,7 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
 
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
-    """Return the geometry that meets the requirements with the largest reserve; None if none does.
+    """Return the geometry that meets the requirements with the largest reserve, or None.
 
     Differential evolution finds it. It is given as logarithms of its sizes and the number of its sheet, shape (4,).
     """

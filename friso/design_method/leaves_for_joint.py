@@ -70,7 +70,7 @@ def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
 
 
 class _Search:
-    """Search over length, spacing and sheet of the leaves, whose width follows from the stiffness."""
+    """Search over the leaves' length, spacing and sheet; the width follows from the stiffness."""
 
     def __init__(self, task: LeafTask, stiffness: float) -> None:
         """Prepare the search for leaves of a `stiffness` [N/m].
@@ -114,7 +114,7 @@ class _Search:
         return np.where(worst > 0, settings.worst_cost + worst, -np.log(frequency))
 
     def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Return lengths, widths and spacings [m], (count, 3), of leaves with the required stiffness."""
+        """Return lengths, widths and spacings [m], (count, 3), of leaves of the required stiffness."""
         settings = DesignSettings.current()
         sizes = np.insert(spans, 1, self.high[1], axis=1)
         for _ in range(settings.width_steps):

@@ -187,7 +187,7 @@ class UnfinishedDesign:
 
 
 class DesignInterrupted(KeyboardInterrupt):
-    """Raised by Ctrl-C once there are leaf springs and a crossover; it holds the design `so_far`."""
+    """Raised by Ctrl-C once leaf springs and a crossover are found; `so_far` is the design."""
 
     def __init__(self, so_far: UnfinishedDesign) -> None:
         super().__init__()

@@ -24,7 +24,7 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the stage's flat keys with the values of each machine; the controller stays unchanged."""
+        """Return the flat keys with each machine's values; the controller stays unchanged."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:
@@ -96,7 +96,10 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
-    """Return moves there and back at fractions, from 0 to 1, of the ranges of travel and acceleration."""
+    """Return moves there and back at fractions, from 0 to 1, of travel and acceleration.
+
+    The fractions are those of the ranges.
+    """
     settings = DesignSettings.current()
     distance, rate = (
         interval.low * (interval.high / interval.low) ** share

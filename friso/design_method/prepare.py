@@ -93,7 +93,7 @@ def complete_joint(stage: Stage, spec: Spec) -> Stage:
 
 
 def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
-    """Return the masses and joint keys that are assumed for a stage without a joint, by key [SI]."""
+    """Return the masses and joint keys assumed for a stage without a joint, by key [SI]."""
     if stage.joint is not None:
         return {}
     before, after = stage.flat(), complete_joint(stage, spec).flat()

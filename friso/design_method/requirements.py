@@ -81,7 +81,7 @@ def less(key: str, value: float, unit: str) -> RelaxableKey:
 
 
 def safety_factor(key: str, value: float) -> RelaxableKey:
-    """Return a factor of safety as a key that relaxes a requirement; it cannot be smaller than 1."""
+    """Return a factor of safety, at least 1, as a key that relaxes a requirement."""
     return RelaxableKey(key, value, "", lambda excess: value / excess if value >= excess else None)
 
 

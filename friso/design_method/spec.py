@@ -81,7 +81,7 @@ GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7,
 
 @dataclass(frozen=True)
 class Gauges(OneOrMany):
-    """A key that takes a list of thicknesses, or a range, which stands for the usual gauges in it."""
+    """A key for a list of thicknesses, or a range, which stands for its usual gauges."""
 
     def read(self, entry: Any) -> tuple[Any, ...]:
         """Read the thicknesses. Raises SpecError."""
@@ -111,7 +111,7 @@ FORMER_LIMIT = "bandwidth_limit"
 
 
 class SpecMachine(Section):
-    """How fast the controller of the machine may be, or the parasitic frequencies that decide it."""
+    """How fast the controller may be, or the parasitic frequencies that decide it."""
 
     crossover_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
     parasitic_frequencies: Annotated[
@@ -178,7 +178,10 @@ class SpecMoves(Section):
 
 
 class Position(Section):
-    """When a move is done: from when on the stage stays within `window` of its reference; the time this may take."""
+    """When a move is done: once the stage stays within `window` of its reference.
+
+    Also the time that this may take.
+    """
 
     window: Annotated[Value, Quantity("m", positive, "1 um")]
     settling_time: Annotated[Value | None, Quantity("s", positive, "1 s")] = None
@@ -201,7 +204,7 @@ class Load(Section):
 
 
 class SpecLeaves(Section):
-    """What can be built: the space for the leaves, the available sheets and materials, and the stroke.
+    """What can be built: the leaves' space, the available sheets and materials, the stroke.
 
     A single length, width or spacing is the largest allowed, a tenth of it the least.
     """

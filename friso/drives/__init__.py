@@ -1,1 +1,1 @@
-"""Turn parameter files of drives and motion controllers into stages, and stages into such parameters."""
+"""Turn parameter files of drives into stages, and stages into such parameters."""

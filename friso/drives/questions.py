@@ -128,7 +128,7 @@ def _of_table(
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
-    """Refuse to go on while questions are open. Raises InputError that lists all of them at once."""
+    """Refuse to go on while questions are open. Raises InputError that lists them all."""
     asked = list(questions)
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"

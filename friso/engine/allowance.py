@@ -67,7 +67,7 @@ class Allowance:
         raise Exhausted
 
     def charge(self, steps: np.ndarray, step: float) -> None:
-        """Add the work of a batch of runs, from their steps, shape (runs,), and the work of a `step`.
+        """Add the work of runs, from their numbers of steps, (runs,), and the work of a `step`.
 
         A single run counts as much as eight.
         """

@@ -85,7 +85,7 @@ class Results(NamedTuple):
 
 
 def new_queue() -> np.ndarray:
-    """Return a queue, shape (1,), from which threads take the numbers of their runs, beginning with 0."""
+    """Return a queue, (1,), from which threads take the numbers of their runs, from 0 on."""
     return np.zeros(1, np.int64)
 
 

@@ -1,4 +1,7 @@
-"""Build kernels, and the loops that run them, in the process that fills the cache (`friso.engine.builder`)."""
+"""Build kernels, and the loops that run them, in the process that fills the cache.
+
+`friso.engine.builder` starts that process.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Compile the kernel of a pickled task, or without a task the driver, into a folder of the cache.
+    """Compile the kernel of a pickled task, or else the driver, into a folder of the cache.
 
     Returns the name of the entry.
     """

@@ -92,7 +92,7 @@ class _Work:
         wait([job.met for job in jobs], _AT_THE_END)
 
     def _joined(self, request: CodeRequest, place: str) -> _Job:
-        """Return the job of a request, started if necessary, with its count of waiting threads raised.
+        """Return the job of a request, started if necessary, and count one more waiting thread.
 
         An abandoned job is started again.
         """

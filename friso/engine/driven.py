@@ -39,7 +39,10 @@ class Inputs:
 
     @property
     def segments(self) -> np.ndarray:
-        """Return the pieces of the reference for the engine, shape (forces, n + 1, 6): one per sample, and the end."""
+        """Return the pieces of the reference for the engine, (forces, n + 1, 6).
+
+        There is one per sample, and the end.
+        """
         n, force = len(self.reference), np.atleast_2d(self.force)
         rows = np.zeros((len(force), n + 1, 6))
         rows[:, :, 0] = np.arange(n + 1) * self.sample_time
@@ -53,7 +56,10 @@ class Inputs:
 
 @dataclass(frozen=True)
 class DrivenRuns:
-    """States of driven runs at the samples, (runs, n, states), and numbers held between samples, (runs, n, held)."""
+    """States at the samples, (runs, n, states), and held numbers, (runs, n, held).
+
+    Held numbers keep their values between samples.
+    """
 
     numbers: np.ndarray
     states: np.ndarray

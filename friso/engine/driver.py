@@ -1,4 +1,4 @@
-"""Keep all lanes busy: load runs, serve lanes that need attention, refill a lane as its run ends.
+"""Keep all lanes busy: load runs, serve lanes that need it, refill a lane as its run ends.
 
 This code is compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a
 model are in its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
@@ -56,7 +56,7 @@ def deviation(B, layout, lane, theta):
 
 
 def deviation_rate(B, layout, lane, theta):
-    """Return velocity minus the reference's velocity [m/s] at the fraction theta of the last step."""
+    """Return velocity minus reference velocity [m/s] at the fraction theta of the last step."""
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
@@ -191,9 +191,10 @@ def reference_of(batch, j):
 
 
 def enter_segment(B, layout, lane, j, segment, batch):
-    """Start the next piece of the reference that has a duration, or the last one, which ends the run.
+    """Start the next piece of the reference, or the last one, which ends the run.
 
-    One piece opens the window over which the extremes of the deviation are taken.
+    Pieces without a duration are passed over. One piece opens the window over which the extremes of the deviation are
+    taken.
     """
     segments = batch.segments[reference_of(batch, j)]
     count = segments.shape[0] - 1

@@ -1,4 +1,4 @@
-"""Represent the kernel of a structure, compiled on first use and loaded from the cache afterwards."""
+"""Represent the kernel of a structure, compiled on first use and then cached."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Kernel:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """Return the names of numbers held between samples, and of modes that remember, which come last."""
+        """Return the names of numbers held between samples, and then of modes with memory."""
         return self.module.HELD_NAMES
 
     @property
@@ -151,9 +151,9 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """Return states and held numbers in a steady motion after all transients, (runs, initial_size).
+        """Return states and held numbers in steady motion after all transients.
 
-        `flat` and the numbers of the motion may be arrays of shape (runs,).
+        The shape is (runs, initial_size). `flat` and the numbers of the motion may be arrays of shape (runs,).
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 

@@ -1,4 +1,7 @@
-"""Define kinds of arguments of compiled loops (`friso.engine.scalar_code`), and pack them as 64-bit words."""
+"""Define argument kinds of compiled loops, and pack arguments as 64-bit words.
+
+The loops are written for `friso.engine.scalar_code`.
+"""
 
 from __future__ import annotations
 
@@ -74,7 +77,7 @@ INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
 def argument_kind(example: Any) -> CompiledKind:
-    """Return the kind of an argument. Raises TypeError for arguments that compiled loops do not take."""
+    """Return the kind of an argument. Raises TypeError if compiled loops do not take it."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
     names = getattr(example, "_fields", None)
@@ -92,7 +95,7 @@ class Packing:
         self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))
 
     def packed(self, arguments: Sequence[Any]) -> bytes:
-        """Return the words of the arguments; arrays must outlive them.
+        """Return the arguments as 64-bit words; arrays must outlive the words.
 
         Raises TypeError for arguments of other kinds.
         """

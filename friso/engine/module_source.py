@@ -1,4 +1,4 @@
-"""Write the module of a model: its kernel, and the NumPy functions that prepare its runs and read its states.
+"""Write a model's module: its kernel, and functions that prepare and read its runs.
 
 A module needs no SymPy to run, so a warm start loads neither the equations nor their derivatives.
 """
@@ -91,7 +91,7 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return the indices of states that a sampled drive measures, and of those that enter its tables.
+    """Return indices of states that a sampled drive measures, and of those in its tables.
 
     Also returns, for each table, the index of the state over which it is looked up.
     """

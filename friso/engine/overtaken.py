@@ -65,7 +65,7 @@ _turn = Condition()
 
 @contextmanager
 def going_first() -> Iterator[None]:
-    """Give priority to runs within the block: other work of this process waits at its next batch of runs."""
+    """Give priority to runs within the block: other work waits at its next batch of runs."""
     token, own = _FIRST.set(True), object()
     with _turn:
         _ahead[own] = time.monotonic() + AHEAD

@@ -1,7 +1,8 @@
-"""Compute exp, log, tanh, powers and random numbers in straight-line code, without calls, branches or tables.
+"""Compute exp, log, tanh, powers and random numbers in straight-line code.
 
-Mathematics libraries work on one number at a time, so these functions split off the exponent by the bits of the number.
-Relative errors are below 1e-15 over the ranges stated; tested against NumPy. `friso.engine.vector_code` compiles them.
+The code has no calls, branches or tables. Mathematics libraries work on one number at a time, so these functions split
+off the exponent by the bits of the number. Relative errors are below 1e-15 over the ranges stated; tested against
+NumPy. `friso.engine.vector_code` compiles them.
 """
 
 from __future__ import annotations

@@ -205,7 +205,7 @@ class StepWriter:
         return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
-        """Return the code for the distance of each quantity from the beginning of its table cell, in cells."""
+        """Return the code for each quantity's distance from its table cell's beginning, in cells."""
         lines = []
         for w, x in enumerate(self._walks):
             first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
@@ -279,7 +279,7 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """Return the code that chooses the next step, at most to the corner of the reference or the next tick.
+        """Return the code for the next step, at most to the reference's corner or the next tick.
 
         The last two steps before that point are made equal.
         """

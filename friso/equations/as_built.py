@@ -171,7 +171,10 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return the encoder's reading [m], the commanded force [N], and the numbers kept until the next sample."""
+    """Return the encoder's reading [m], the commanded force [N], and the held numbers.
+
+    Held numbers are kept until the next sample.
+    """
     from dataclasses import replace
 
     import sympy as sp

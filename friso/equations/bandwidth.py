@@ -37,7 +37,7 @@ def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
 
 
 def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return the keys that change when a controller becomes faster by a factor, with their new values."""
+    """Return the keys that change, with new values, when a controller becomes faster."""
     controller = controller_of(flat)
     powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
@@ -57,7 +57,10 @@ def range_example(flat: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class _Numbers:
-    """A controller's keys as numbers, for `ControllerSection.stiffness`, which usually gets symbols."""
+    """A controller's keys as numbers, for `ControllerSection.stiffness`.
+
+    That function usually gets symbols.
+    """
 
     flat: Mapping[str, Any]
 

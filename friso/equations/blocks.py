@@ -50,7 +50,10 @@ def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
 
 @dataclass(frozen=True)
 class Controller:
-    """A controller: its force [N], its component of the model, and its numbers held between samples."""
+    """A controller: its force [N], its part of the model, and its held numbers.
+
+    Held numbers keep their values between samples.
+    """
 
     force: sp.Expr
     component: Component

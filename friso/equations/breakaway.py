@@ -1,4 +1,4 @@
-"""Compute the forces at which guide and motor break away and slide, from their friction laws."""
+"""Compute the forces at which guide and motor break away and slide."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the flat keys twice: as the guide's friction law sees them, and as the motor's does."""
+    """Return the flat keys as the guide's friction law sees them, and as the motor's does."""
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]
 

@@ -45,7 +45,7 @@ def load_follows(flat: Mapping[str, Any]) -> bool:
 
 
 def friction_level(name: str, conditions: bool) -> sp.Expr:
-    """Return static or Coulomb friction [N], multiplied by its factor if the stage has [conditions].
+    """Return static or Coulomb friction [N], times its factor if the stage has [conditions].
 
     It is valid at constant speed of the reference.
     """
@@ -107,7 +107,7 @@ def _deviates(flat: Mapping[str, Any]) -> bool:
 
 
 def _at_place(flat: Mapping[str, Any], place: Any) -> np.ndarray:
-    """Return factors of static and Coulomb friction at places [m] on the rail, shape (2,) or (2, n)."""
+    """Return factors of static and Coulomb friction at places [m] on the rail, (2,) or (2, n)."""
     from friso.equations.rail import friction_factors
 
     rail = {key: value for key, value in flat.items() if key.startswith("rail.")}

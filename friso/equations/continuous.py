@@ -56,7 +56,7 @@ FAR = 1e9
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the proportional [N/m] and integral gain [N/(m s)] of a controller for slow, large errors.
+    """Return proportional [N/m] and integral gain [N/(m s)] for slow, large errors.
 
     Such an error lies beyond all windows and deadbands, and the reference rests.
     """

@@ -1,4 +1,4 @@
-"""Declare a stage that follows a log: reference and external force are given sample by sample."""
+"""Declare a stage that follows a log: reference and external force at every sample."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Driven:
 
 
 def driven(form: Driven) -> Model:
-    """Return the equations of a stage whose reference and external force are given at every sample.
+    """Return the equations of a stage with reference and external force at every sample.
 
     The reference has position [m], velocity [m/s] and acceleration [m/s^2]. The external force [N] acts in addition to
     the controller's, and has a rate [N/s].

@@ -1,4 +1,4 @@
-"""Declare the compliant joint between cart and stage, with its stroke limiter (thesis, Fig. 3).
+"""Declare the compliant joint between cart and stage, with its limiter (thesis, Fig. 3).
 
 Table 1 of the thesis prints a series formula for the touched limiter. A touching limiter acts in parallel with the leaf
 springs, so stiffness and damping are added here.

@@ -1,4 +1,7 @@
-"""Masses in a chain: cart - joint - stage - parasitic mass; or one rigid mass (thesis, Fig. 3 and 4)."""
+"""Masses in a chain: cart, joint, stage, parasitic mass; or one rigid mass.
+
+See Fig. 3 and 4 of the thesis.
+"""
 
 from __future__ import annotations
 

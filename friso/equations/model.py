@@ -1,4 +1,4 @@
-"""A stage's equations, assembled from their parts: states, right-hand side, kinks and outputs."""
+"""A stage's equations, assembled from parts: states, right-hand side, kinks, outputs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SMALLEST_LENGTH = sp.Rational(1, 10**4)
 
 @dataclass(frozen=True)
 class Model:
-    """Equations of a stage with the bodies `stage`, which is measured, and `cart`, with friction.
+    """Equations of a stage with the bodies `stage` (measured) and `cart` (with friction).
 
     A rigid stage has one body that is both. The right-hand side is smooth while the kinks' `beyond` symbols are held.
     `TIME` counts from the last corner of the reference.

@@ -1,4 +1,4 @@
-"""Describe a stage's motion for other modules: pieces of its reference, standstill, size and start."""
+"""Describe a stage's motion: pieces of its reference, standstill, size and start."""
 
 from __future__ import annotations
 
@@ -118,7 +118,10 @@ def ends_evenly(flat: Mapping[str, Any]) -> bool:
 
 
 def _ends_without(derivative: int, flat: Mapping[str, Any]) -> bool:
-    """Tell whether this derivative of the reference and all higher ones end at zero, for all stages."""
+    """Tell whether this derivative of the reference and all higher ones end at zero.
+
+    It holds for all stages.
+    """
     rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
     return bool(np.all(at_rest(form_of(flat), rows[:, -1], derivative)))
 
@@ -129,7 +132,7 @@ def returns(flat: Mapping[str, Any]) -> bool:
 
 
 def last_corner(flat: Mapping[str, Any]) -> Any:
-    """Return the time of the last corner of the reference [s]; from there on one formula describes it."""
+    """Return the time [s] of the reference's last corner; after it one formula holds."""
     return motion_of(flat).pieces(flat)[-1][0]
 
 

@@ -1,4 +1,4 @@
-"""Compute the factors by which the bearing's static and Coulomb friction vary along its rail."""
+"""Compute how static and Coulomb friction of the bearing vary along its rail."""
 
 from __future__ import annotations
 

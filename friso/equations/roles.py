@@ -1,4 +1,4 @@
-"""Name the roles of states, and the motion from which runs begin, for modules that use states by role."""
+"""Name the roles of states, and the motion from which runs begin."""
 
 from __future__ import annotations
 

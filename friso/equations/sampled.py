@@ -43,7 +43,10 @@ def counter(loop: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class Rest:
-    """Conditions under which integrators pause for a sample, or restart, apart from the force limit."""
+    """Conditions under which integrators pause or restart, apart from the force limit.
+
+    They hold for a sample.
+    """
 
     rests: Any = sp.false
     restarts: Any = sp.false
@@ -287,7 +290,7 @@ class Sampled(Blocks):
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _standstill(self, error: sp.Expr) -> Rest:
-        """Return the conditions under which the settings against friction pause and restart integrals."""
+        """Return when the settings against friction pause and restart integrals."""
         rests: Any = sp.false
         restarts: Any = sp.false
         if self.settings.deadband:
@@ -306,7 +309,7 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before its limit, and all held numbers, with what integrators do at limits.
+        """Return the force before its limit and all held numbers, with integrators at limits.
 
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.

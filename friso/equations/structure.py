@@ -1,4 +1,4 @@
-"""Describe the structure of a stage's equations; stages of one structure differ in numbers only."""
+"""Describe a stage's structure; stages of one structure differ in numbers only."""
 
 from __future__ import annotations
 

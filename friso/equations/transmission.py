@@ -1,7 +1,8 @@
-"""Screw, belt or gear between motor and load: a spring and a damper, which a backlash leaves idle while it is crossed.
+"""Screw, belt or gear between motor and load: a spring and damper with backlash.
 
-The motor is a body of its own, its mass and motion taken at the load: one turn of the motor moves the load by a lead.
-Friction at the motor is a friction law of its own, of the table [motor_friction].
+Both are idle while the backlash is crossed. The motor is a body of its own, its mass and motion taken at the load: one
+turn of the motor moves the load by a lead. Friction at the motor is a friction law of its own, of the table
+[motor_friction].
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Analyse stages as linear systems: limit cases and states between them, margins, highest bandwidth."""
+"""Analyse stages as linear systems: limit cases, states between them, and margins."""

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @check_arguments
 def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
-    """Return a stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
+    """Return a stage in one state as a `control.StateSpace` in SI units, with named signals.
 
     `case` is the name of a limit case ("stuck", "sliding", "stuck-touched", "sliding-touched", or "given" for a stage
     that has just one; default: the first of them that the stage has), or a state such as

@@ -1,4 +1,4 @@
-"""Compute the bandwidth of a loop, for any controller: the highest frequency at which its gain is 1."""
+"""Compute the bandwidth of a loop: the highest frequency at which its gain is 1."""
 
 from __future__ import annotations
 

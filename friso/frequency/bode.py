@@ -1,4 +1,4 @@
-"""Analyse a stage linearly: limit cases, states between them, and the controller's highest bandwidth."""
+"""Analyse a stage linearly: limit cases, states between them, and highest bandwidth."""
 
 from __future__ import annotations
 
@@ -124,7 +124,10 @@ class Bode:
 
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
-        """Return the ranges of stable crossovers, for the joint "locked" and "free", or "given" without a joint."""
+        """Return the ranges of stable crossovers, for the joint "locked" and "free", or "given".
+
+        "given" is the only case without a joint.
+        """
         stages = _by_joint(self.stage)
         return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
@@ -216,7 +219,10 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 
 
 def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
-    """Return the ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
+    """Return the ranges of speed at which the stage is not stable.
+
+    There is one list for each state of the limiter and direction.
+    """
     sliding = members[~members.stuck]
     ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):

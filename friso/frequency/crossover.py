@@ -179,10 +179,10 @@ class _Search:
 
     @cached_property
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
-        """Return frequencies [rad/s] that resolve the loop at all crossovers, and a function for loops there.
+        """Return frequencies [rad/s] that resolve the loop at all crossovers, and a loop function.
 
-        The frequencies do not depend on the crossover, so that the distance is a smooth function. The function takes
-        the keys of any controller.
+        The frequencies do not depend on the crossover, so that the distance is a
+        smooth function. The function takes the keys of any controller.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]

@@ -1,4 +1,4 @@
-"""Linearise declared equations: derive their Jacobian once, and evaluate it for many members."""
+"""Linearise declared equations: derive the Jacobian once, and evaluate it for members."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Declared:
 
     @cached_property
     def _entries(self) -> tuple[list[tuple[int, int]], Any, list[str]]:
-        """Return the places of the non-zero entries of [[a, b], [c, d]], and a function for their values.
+        """Return the places of non-zero entries of [[a, b], [c, d]], and a function for them.
 
         Also returns the names of the function's arguments.
         """

@@ -1,4 +1,4 @@
-"""Model the drive that executes the controller: hold, delay and current loop before the plant."""
+"""Model the drive between controller and plant: hold, delay and current loop."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class DriveTiming:
 
     @property
     def highest(self) -> float:
-        """Return half the sampling frequency [rad/s], the highest frequency that the drive can represent."""
+        """Return half the sampling frequency [rad/s], the highest that the drive can represent."""
         return np.pi / self.sample_time if self.sample_time else np.inf
 
     @property
@@ -73,7 +73,10 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return the response of hold, delay and current loop at frequencies [rad/s], without aliases."""
+        """Return the response of hold, delay and current loop at frequencies [rad/s].
+
+        Aliases are left out.
+        """
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 

@@ -55,7 +55,10 @@ def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of the motor's friction, with the names of the motor's states; None without friction."""
+    """Return the law of the motor's friction, with the motor's states; None without friction.
+
+    The states are given by their names.
+    """
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
     if law is None:
@@ -137,7 +140,7 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return speeds [m/s] from creeping to so fast that friction hardly depends on speed, shape (count,)."""
+    """Return speeds [m/s] from creeping to where friction hardly depends on speed, (count,)."""
     settings = FrequencySettings.current()
     flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}

@@ -185,7 +185,7 @@ def _driven(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Sy
 
 
 def _held(machine: System, drive: DriveTiming) -> System:
-    """Return the plant behind hold and delay, from the force at a sample to the positions at the next."""
+    """Return the plant behind hold and delay, from the force to the positions one sample later."""
     samples, late = drive.samples_late
     return waited(zero_order_hold(machine, drive.sample_time, late), samples).take((FORCE,), (STAGE, RATED))
 
@@ -220,7 +220,7 @@ def _squared(at: Complex, pole: Complex) -> np.ndarray:
 
 
 def _shut(loop: System) -> Complex:
-    """Return the poles of the closed loop of a cut loop whose force does not act at once (d is 0)."""
+    """Return the poles of the closed loop of a cut loop without direct feedthrough (d is 0)."""
     return np.linalg.eigvals(loop.a - loop.b @ loop.c).astype(complex)
 
 

@@ -1,4 +1,4 @@
-"""Compute margins of one loop: how much gain, phase or delay takes it to the edge of stability.
+"""Compute margins of one loop: the gain, phase or delay that makes it unstable.
 
 Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins).
 """
@@ -176,7 +176,7 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
-    """Return the factors on the gain that take the loop through -1: where L is real and negative."""
+    """Return the gain factors that take the loop through -1: where L is real and negative."""
     settings = FrequencySettings.current()
     # leave out rounding
     clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)

@@ -1,4 +1,4 @@
-"""Define the states that a stage can be in: the thesis's limit cases (Table 1) and states between them."""
+"""Define the states of a stage: the thesis's limit cases (Table 1), and those between."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Find the steady state of the friction law: stuck under a bias force, or sliding at a speed."""
+"""Find the friction law's steady state: stuck under a bias force, or sliding at a speed."""
 
 from __future__ import annotations
 

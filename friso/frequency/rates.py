@@ -51,7 +51,7 @@ class Lifted:
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def over(self, turn: np.ndarray) -> Complex:
-        """Return the matrices at the frequency at which a signal turns by `turn` [rad] (k,) in a sample."""
+        """Return the matrices at frequencies at which a signal turns by `turn` [rad] (k,) a sample."""
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
@@ -156,7 +156,10 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
 
 
 def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
-    """Return the controller alone over a period, from one measured channel, STAGE or RATED, to the forces."""
+    """Return the controller over a period, from one measured channel to the forces.
+
+    The channel is STAGE or RATED.
+    """
     seen = [control.take((measured,), (FORCE,)) for control in controls]
     lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
     direct = np.zeros_like(lifted.d)

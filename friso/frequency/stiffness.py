@@ -1,6 +1,6 @@
-"""Compute springs in series: joint and bearing (thesis, Eq. 1), and the touched limiter of Table 1.
+"""Compute springs in series: joint and bearing (Eq. 1), and the touched limiter (Table 1).
 
-The bearing acts as a spring before it slides.
+The numbers are those of the thesis. The bearing acts as a spring before it slides.
 """
 
 from __future__ import annotations
@@ -10,12 +10,15 @@ from typing import Any
 
 
 def in_series(first: Any, second: Any) -> Any:
-    """Return the stiffness [N/m] of two springs, or the damping [N s/m] of two dampers, in series (Eq. 1)."""
+    """Return the stiffness [N/m] of two springs, or damping [N s/m] of two dampers, in series.
+
+    See Eq. 1 of the thesis.
+    """
     return first * second / (first + second)
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with joint and limiter in series in place of its joint, as Table 1 prints.
+    """Return the stage with joint and limiter in series as its joint, as Table 1 prints.
 
     Stiffness and damping are k1 k2 / (k1 + k2), and the limiter never touches.
     """

@@ -40,7 +40,10 @@ class System:
         return bool(self.b[..., column].any() or self.d[..., column].any())
 
     def at(self, points: np.ndarray) -> Complex:
-        """Return transfer matrices c (s - a)^-1 b + d, (members, k, p, m), at points s (k,) or (members, k)."""
+        """Return transfer matrices c (s - a)^-1 b + d at points s, (k,) or (members, k).
+
+        The result has shape (members, k, p, m).
+        """
         n = len(self.states)
         shifted = points[..., None, None] * np.eye(n) - self.a[:, None]
         answers = np.linalg.solve(shifted, self.b[:, None])

@@ -1,4 +1,4 @@
-"""Apply van Dijk's tuning rules (thesis, Eq. 7 and 8) to the mass they are meant for: gains and margins."""
+"""Apply van Dijk's tuning rules (thesis, Eq. 7 and 8) to the mass they are meant for."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Tuning:
 
     @property
     def true_crossover(self) -> float:
-        """Return the frequency [Hz] at which the loop crosses 0 dB, slightly above the tuned crossover."""
+        """Return the 0 dB crossing [Hz] of the loop, slightly above the tuned crossover."""
         return self.margins.crossovers[-1]
 
 

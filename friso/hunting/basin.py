@@ -126,7 +126,7 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages at a tighter tolerance towards swings that were only observed, as `ends_in` does."""
+    """Run stages at a tighter tolerance towards observed swings, as `ends_in` does."""
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -154,7 +154,7 @@ def _last_swing(
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages to the time `end` [s], and measure peak to peak over the time `last` [s] before it.
+    """Run stages to the time `end` [s]; measure peak to peak over `last` [s] before it.
 
     Both times have the shape (count,). Returns the swing [m], which runs were completed, and the final states, (count,
     kept).
@@ -244,9 +244,10 @@ def pushes_that_hunt(
 
 
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """Find the windows of kicks that hunt: search a grid around `unit`, then narrow down each edge.
+    """Find the windows of kicks that hunt, and narrow down their edges.
 
-    `hunts` runs some kicks; it returns which of them hunt and which runs were completed.
+    The search covers a grid around the kick `unit`. `hunts` runs some kicks; it returns which of them hunt and which
+    runs were completed.
     """
     settings = BasinSettings.current()
     tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)

@@ -110,7 +110,7 @@ class Case:
 
     @property
     def runs_away(self) -> bool:
-        """Tell whether the motion diverges because the loop is unstable; there is then no other verdict."""
+        """Tell whether the motion diverges because the loop is unstable; then no verdict follows."""
         return self.verdict == "failed" and self.judgement.runs_away
 
     @property
@@ -265,7 +265,10 @@ def _case(
 
 
 def _fed(stage: Stage, work: float) -> Feeding | None:
-    """Find the cause that feeds the cycle of a stage with a backlash; return None if that takes too much work."""
+    """Find the cause that feeds the cycle of a stage with a backlash.
+
+    Returns None if that takes too much work.
+    """
     try:
         with allowance(work):
             return feeding(stage)

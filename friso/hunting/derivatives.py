@@ -111,11 +111,11 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """Return how the edge of hunting in bandwidth depends on each key, (keys,): relative change per change.
+    """Return how the edge of hunting in bandwidth depends on each key, (keys,).
 
-    The edge lies at `factor` times the bandwidth of the stage, everything else unchanged. Along the edge the multiplier
-    keeps its value; its derivatives are central differences of an exact derivative of the flow. Returns None if no
-    cycle flips there.
+    The result is the relative change of the edge per change of the key. The edge lies at `factor` times the bandwidth
+    of the stage, everything else unchanged. Along the edge the multiplier keeps its value; its derivatives are central
+    differences of an exact derivative of the flow. Returns None if no cycle flips there.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))
@@ -141,9 +141,9 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """Return the multipliers, (stages,), of stages that differ slightly from the stage of the cycle `first`.
+    """Return the multipliers, (stages,), of stages that differ slightly from one.
 
-    Returns None if an orbit could not be closed, or a multiplier is complex.
+    `first` is the cycle of that stage. Returns None if an orbit could not be closed, or a multiplier is complex.
     """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}

@@ -1,4 +1,4 @@
-"""Find the cause that feeds the hunting of a stage with a backlash: dry friction or the backlash.
+"""Find the cause that feeds a stage's hunting: dry friction or the backlash.
 
 Each cause is scaled down separately, step by step, and the stage is surveyed at every step, because the cycle may
 change its form on the way. Viscous friction stays, because it only damps.
@@ -42,14 +42,14 @@ class Decline:
 
 @dataclass(frozen=True)
 class Feeding:
-    """How hunting declines when dry friction (None: there is none) or the backlash is scaled down."""
+    """How hunting declines when dry friction (None: no friction) or backlash is scaled down."""
 
     friction: Decline | None
     backlash: Decline
 
 
 def feeding(stage: Stage) -> Feeding | None:
-    """Find the cause that feeds the hunting of a stage with a backlash; None for a stage without backlash."""
+    """Find the cause that feeds the hunting of a stage with a backlash; None without backlash."""
     flat = stage.flat()
     if not structure(flat).plays:
         return None

@@ -29,9 +29,10 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
 
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
-    """Return the stability of loops for swings far beyond a force limit without anti-windup, words (count,).
+    """Return the stability of loops far beyond a force limit, words (count,).
 
-    Swings grow if the loop is unstable there, and shrink if it is stable. Returns None if there is no such limit.
+    There is no anti-windup. Swings grow if the loop is unstable there, and shrink if it is stable. Returns None if
+    there is no such limit.
     """
     return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
@@ -46,7 +47,7 @@ def may_run_away(stages: Ensemble) -> np.ndarray:
 
 
 def surely_run_away(stages: Ensemble) -> np.ndarray:
-    """Tell which stages certainly diverge beyond a force limit without anti-windup, shape (count,).
+    """Tell which stages surely diverge beyond a force limit without anti-windup, (count,).
 
     Their loop at lower gains is unstable. All are False without such a limit.
     """
@@ -76,7 +77,10 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Judge the stability at lower gains of stages with a known gain key, few enough for the memory."""
+    """Judge the stability at lower gains of few stages with a known gain key.
+
+    The stages are few enough for the memory.
+    """
     settings = CheckSettings.current()
     shares = np.geomspace(*settings.lower_gain_shares)
     controller, form = controller_of(stages.flat), stages.structure
@@ -176,16 +180,19 @@ def _lags(stages: Ensemble) -> np.ndarray:
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
-    """Return the fastest growth rates [1/s] in each state, (count,); NaN for equations that are not finite.
+    """Return the fastest growth rates [1/s] in each state, (count,).
 
-    A limiter may be `touched`.
+    NaN for equations that are not finite. A limiter may be `touched`.
     """
     stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
-    """Return the fastest growth rates [1/s] of linear equations, (count, states, states); NaN if not finite."""
+    """Return the fastest growth rates [1/s] of linear equations, (count, states, states).
+
+    NaN if they are not finite.
+    """
     rates = np.full(len(matrices), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2))
     rates[finite] = np.linalg.eigvals(matrices[finite]).real.max(axis=1)
@@ -193,7 +200,10 @@ def _growth(matrices: np.ndarray) -> np.ndarray:
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
-    """Return the index of the motor's position (0) or velocity (1); without a transmission the first state."""
+    """Return the index of the motor's position (0) or velocity (1).
+
+    Without a transmission it is that of the first state.
+    """
     names = stages.kernel.states
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
@@ -226,7 +236,7 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the linear system of a sliding stage, with viscous friction and no states of the friction law.
+    """Return the linear system of a sliding stage, without states of the friction law.
 
     `of_directions` combines the viscous friction of the two directions.
     """
@@ -258,7 +268,7 @@ def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
 
 
 def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
-    """Return states of stages that have slid for long at a speed [m/s] each, so that friction is steady."""
+    """Return states of stages that have slid at a speed [m/s] until friction is steady."""
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
     begun = stages.rates(states)[:, bristles]

@@ -116,10 +116,10 @@ def find_attractors(
 def sketch_attractors(
     flat: Mapping[str, Any], count: int, threads: int | None = None, cancel: np.ndarray | None = None
 ) -> StageAttractors:
-    """Sketch the attractors of stages of one structure by coarse return maps, and by simulations where these fail.
+    """Sketch the attractors of stages of one structure by coarse return maps.
 
-    A sketch is faster than `find_attractors`, and may miss an attractor with a narrow basin. `threads` and `cancel` as
-    in `RunOptions`. Raises Exhausted if an allowance of work is used up.
+    Where these fail, it simulates. A sketch is faster than `find_attractors`, and may miss an attractor with a narrow
+    basin. `threads` and `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -136,7 +136,7 @@ def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return which stages of one structure have an unstable loop regardless of friction, (count,).
+    """Return which stages of one structure have an unstable loop whatever the friction, (count,).
 
     The loop is unstable while the stage sticks, or while it slides.
     """

@@ -119,7 +119,10 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 class _Grid:
-    """Factors of the bandwidth, ascending, with the attractors at each; all from number `lowest` on were searched."""
+    """Factors of the bandwidth, ascending, with the attractors at each.
+
+    All from number `lowest` on were searched.
+    """
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
         """Survey the stages at factors from number `first` on. Raises Exhausted."""
@@ -132,7 +135,7 @@ class _Grid:
         self._survey(np.arange(first, len(factors)))
 
     def search_below(self) -> None:
-        """Survey the lower factors, whose motions are the slowest, until an allowance of work is used up."""
+        """Survey the lower factors, whose motions are slowest, until the work is used up."""
         try:
             self._survey(np.arange(self.lowest))
         except Exhausted:
@@ -209,7 +212,7 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Find the end of attraction between a factor and the next one above (`ahead` 1) or below (-1).
+        """Find the end of attraction between a factor and the next one, above (1) or below (-1).
 
         Returns None if attraction reaches the end of the search, which is then recorded for all factors up to there, or
         if closer inspection shows no attractor. If the allowance is used up, the end is not certain.
@@ -247,7 +250,7 @@ class _Grid:
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Mark the factors, shape (count,), past which a stable orbit was followed, as having an attractor."""
+        """Mark the factors, (count,), past which a stable orbit was followed, as attracting."""
         self.passed |= where
         self.attracts |= where
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())

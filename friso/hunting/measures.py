@@ -100,7 +100,7 @@ def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
 
 
 def turns_of(runs: Runs, corner: np.ndarray | float = 0.0) -> Turns:
-    """Scan the turning points of a chunk of runs whose references stand from the `corner` [s] on."""
+    """Scan the turning points of runs whose references stand from the time `corner` [s] on."""
     results = runs.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
@@ -129,7 +129,7 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
 
 
 def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
-    """Measure a chunk of runs of the stages `flat`, whose arrays have one entry per run of the chunk."""
+    """Measure a chunk of runs of the stages `flat`, whose arrays have one entry per run."""
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled

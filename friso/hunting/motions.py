@@ -89,7 +89,7 @@ class FollowedMotions:
         return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Continue the motions numbered `which`, of the stages `flat`, for a long time. Raises Exhausted."""
+        """Continue the motions numbered `which` of the stages `flat` for long. Raises Exhausted."""
         settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
         waits = settings.least_followed_waits * wait(stages, loose_from(stages))
@@ -134,7 +134,10 @@ def followed_motions(
 
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """Return the peak-to-peak swings [m] up to which stages of one structure count as at rest, (count,)."""
+    """Return the swings [m] up to which stages of one structure count as at rest, (count,).
+
+    Swings are measured peak to peak.
+    """
     return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 

@@ -69,7 +69,10 @@ class BandwidthWindow:
 
 @dataclass
 class _Place:
-    """Progress of a search: motions `at` a factor, and a factor `outside` that seems to have no attractor."""
+    """Progress of a search: motions at a factor, and a factor that seems to have none.
+
+    They are `at` and `outside`.
+    """
 
     at: float
     motions: tuple[Swinging, ...]
@@ -93,7 +96,7 @@ class EdgeSearch:
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """Find the end of attraction, from motions at the factor `at` towards `outside`, which has none.
+        """Find the end of attraction between the factors `at`, with motions, and `outside`.
 
         Raises Beyond if an attractor exists up to the end of the search. If an allowance of work is used up, the end is
         as close as known by then, and not certain; attraction may have been followed past `outside`.
@@ -180,7 +183,7 @@ class EdgeSearch:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
-        """Tell whether the stage certainly hunts at a place, by a closed orbit or a swing of a thorough survey."""
+        """Tell whether the stage surely hunts, by a closed orbit or a thorough survey's swing."""
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
@@ -247,7 +250,7 @@ class EdgeSearch:
         farthest = start
 
         def over(_: Point, point: Point) -> bool:
-            """Tell whether the orbit has lost stability or turned back; if not, store the farthest point."""
+            """Tell whether the orbit has lost stability or turned back; else store the farthest point."""
             nonlocal farthest
             ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
             farthest = farthest if ended else point

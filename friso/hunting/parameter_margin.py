@@ -34,7 +34,7 @@ Scaled = Callable[[np.ndarray], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class MarginEnd:
-    """End of a margin: two factors of a parameter, close together, between which hunting begins or ends.
+    """End of a margin: two close factors of a parameter between which hunting changes.
 
     From 1 up to `same` the stage hunts, or not, as at its own value; at `other` it does the opposite. The end is
     `certain` if a closed orbit is stable at one of the factors, and a completed search finds no attractor at the other.
@@ -133,7 +133,7 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """Return the number of the first factor with a change, after trying others close to it, or None."""
+        """Return the number of the first factor with a change, after trying close ones; or None."""
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
@@ -148,7 +148,7 @@ class _Side:
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 
     def _pair(self, first: int) -> np.ndarray:
-        """Choose the two factors, by number, to search thoroughly around the first one with a change.
+        """Choose two factors, by number, to search thoroughly around the first change.
 
         Their distances from it are `proved_distances`: close to the end of hunting, motions take long to decay, and a
         rough survey may be wrong. New factors are surveyed roughly.

@@ -1,4 +1,4 @@
-"""Base for results of many stages or runs: arrays with one row each, from which rows can be selected."""
+"""Base for results of many stages or runs: arrays with one row each, to select from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings of hunting: tolerances, the work of a check, the search for the edge of hunting, and kicks."""
+"""Settings of hunting: tolerances, work of a check, search for the edge, and kicks."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class BasinSettings(Settings):
 
 @dataclass(frozen=True)
 class EdgeSettings(Settings):
-    """Settings of the search for the edge of hunting in bandwidth, friction and a joint's design."""
+    """Settings of the search for the edge of hunting in bandwidth, friction and joint."""
 
     edge_pace: float = setting(3.0, "")
     """Step along a branch that leads to an edge, relative to that of a drawn branch."""

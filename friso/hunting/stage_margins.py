@@ -65,7 +65,7 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether a stage with a faster controller still does not hunt if static friction changes.
+    """Tell whether a stage with a faster controller keeps its margin in static friction.
 
     The controller is faster by `factor`; static friction is multiplied and divided by the factor by which advice keeps
     away from an edge. Returns None if this takes more than the given work, or is not certain.

@@ -1,4 +1,4 @@
-"""Measure how a stage follows a moving reference, and how it settles where the reference stands."""
+"""Measure how a stage follows a moving reference, and settles where it stands."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from friso.stage.motion import DURATION, motion_of
 
 @dataclass(frozen=True)
 class Dwell:
-    """A place at which the reference stands: its `number` from 1, position [m], and duration [s].
+    """A place at which the reference stands: `number` from 1, position [m], duration [s].
 
     The reference stands from the time `since` [s]. `settling` has for each band [m] the time [s] until the stage stays
     within the band; None if it does not while the reference stands.
@@ -125,7 +125,7 @@ def dwells_of_trace(stage: Stage, time: np.ndarray, deviation: np.ndarray) -> tu
 
 
 def tracking(stage: Stage, rtol: float) -> Tracking | None:
-    """Return how a stage follows a reference that keeps moving; None if its run was not completed.
+    """Return how a stage follows a moving reference; None if its run was not completed.
 
     For a periodic reference, Newton's method closes the response of equal period, from the end of the stage's own
     motion. The residual is the difference between states one period apart.
@@ -173,7 +173,7 @@ def _reversals(
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
-    """Return the start of a periodic response, shape (1, kept), and its multiplier; None if none could be closed."""
+    """Return start (1, kept) and multiplier of a periodic response; None if not closed."""
     settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
     scales = columns(shape.module.scales(values), 1)[0]

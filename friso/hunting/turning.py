@@ -74,7 +74,7 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks among late and tall maxima: within `SEPARATION` only the tallest counts.
+    """Mark the counted peaks: of late and tall maxima within `SEPARATION` the tallest counts.
 
     MATLAB's findpeaks does so with MinPeakDistance.
     """
@@ -95,10 +95,10 @@ def keep_tallest(times, values, count, kinds, peaks):
 
 
 def mean_period(times, count, kinds, ended):
-    """Return the mean time [s] between maxima of a zigzag in the last quarter, or else between minima.
+    """Return the mean time [s] between maxima in the last quarter, or else between minima.
 
-    A slower swing gives the time between the last two extrema of a kind in the last half. The result is NaN if there
-    are no two of a kind.
+    The zigzag alternates between maxima and minima. A slower swing gives the time between the last two extrema of a
+    kind in the last half. The result is NaN if there are no two of a kind.
     """
     last = -1  # the last swing is not over yet
     for k in range(count):

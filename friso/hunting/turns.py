@@ -1,4 +1,4 @@
-"""Scan the turning points of many runs for counted peaks, the period, and the swing over the last half."""
+"""Scan the turning points of many runs for peaks, period, and swing over the last half."""
 
 from __future__ import annotations
 

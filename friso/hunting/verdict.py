@@ -1,4 +1,4 @@
-"""Judge one stage: whether it has a stable limit cycle, and whether its own motion ends in that cycle."""
+"""Judge one stage: whether it has a stable limit cycle, and whether its motion ends in it."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ UNCHECKED = "runs with hardly different masses, which show whether chance decide
 
 
 class CheckPart(StrEnum):
-    """Part of a check: reported as it begins, and by name if it runs out of work (`Judgement.given_up`).
+    """Part of a check: reported as it begins, and by name if it runs out of work.
 
-    The first three parts are computed in this order; `STARTS` is left out without an attractor. `LOWER_BANDWIDTHS`
-    replaces `BANDWIDTHS` if the stage hunts up to the highest bandwidth. `FRICTION` comes after these, and `FEEDING`
-    for a hunting stage with a backlash.
+    The names are in `Judgement.given_up`. The first three parts are computed in this order; `STARTS` is left out
+    without an attractor. `LOWER_BANDWIDTHS` replaces `BANDWIDTHS` if the stage hunts up to the highest bandwidth.
+    `FRICTION` comes after these, and `FEEDING` for a hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -189,7 +189,10 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage without an attractor: whether its own motion comes to rest, and at which bandwidths it hunts."""
+    """Judge a stage without an attractor: whether it comes to rest, and where it would hunt.
+
+    Where it would hunt is searched along the bandwidth.
+    """
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -241,7 +244,7 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage with an attractor: whether its own motion ends in it, and which starts cause hunting."""
+    """Judge a stage with an attractor: whether its own motion, or another start, leads there."""
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)
@@ -371,7 +374,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """Search the bandwidths within some work; return the result and the part that ran out of work."""
+    """Search the bandwidths within some work; return the result and the part given up."""
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)

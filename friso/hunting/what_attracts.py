@@ -40,7 +40,7 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 def what_attracts(
     stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
 ) -> Attractors:
-    """Find the attractors of stages that may hunt, as closed orbits; by return maps where resolved.
+    """Find the attractors of stages as closed orbits, from return maps where these suffice.
 
     A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
     stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
@@ -70,7 +70,7 @@ def what_attracts(
 
 @dataclass(frozen=True)
 class _Cycles(ArrayRows):
-    """Cycles closed by Newton's method from the maps of stages at rest, and lasting motions beside them.
+    """Cycles closed by Newton's method from maps of stages at rest, with motions beside them.
 
     `held` [m], shape (count, n), are sticking distances of motions beside unstable cycles, NaN for none.
     """
@@ -100,7 +100,10 @@ class _Cycles(ArrayRows):
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Return which stages have a stable cycle, or a lasting motion beside an unstable one, (count,)."""
+        """Return which stages have a stable cycle, or a motion beside an unstable one, (count,).
+
+        The motion beside it lasts.
+        """
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
 
 
@@ -114,7 +117,7 @@ def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycle
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """Return the return map of one stage if its attractors are exactly the given `motions`, else None."""
+    """Return the return map of one stage if its attractors are the given `motions`, else None."""
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)

@@ -198,7 +198,7 @@ def _held(
 
 
 def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return the stiffness of the stage along y and about x and z, with the stage turned about y."""
+    """Return the stage's stiffness along y and about x and z, with the stage turned about y."""
     offsets, tilt = mechanism.offsets, np.cos(turn)
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 1] = -tilt * offsets

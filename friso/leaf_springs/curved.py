@@ -44,7 +44,10 @@ def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the compliance of the section for each force and moment, (points, 6), and arc length, (points,)."""
+    """Return the section's compliance for each force and moment, (points, 6).
+
+    Also returns the arc length, (points,).
+    """
     s = x - mechanism.length / 2
     sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
     shape, ends = (mechanism.length, mechanism.width, mechanism.poisson), 2 * s / mechanism.length

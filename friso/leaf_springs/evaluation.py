@@ -103,7 +103,7 @@ class Evaluation:
 
     @property
     def fatigue_margin(self) -> float:
-        """Return the fatigue limit over the clamp stress at full stroke; NaN if the limit is unknown."""
+        """Return the fatigue limit over the clamp stress at full stroke; NaN if unknown."""
         return self.mechanism.fatigue / self.clamp_stress
 
     @property

@@ -17,7 +17,7 @@ from friso.stage.flexure import register_derivation
 
 @register_derivation("flexure")
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return `joint.stiffness` and the keys of [parasitic] for given leaf springs, by closed forms.
+    """Return `joint.stiffness` and the keys of [parasitic] for leaf springs in closed form.
 
     Raises InputError if a single mechanism buckles under its load.
     """

@@ -1,4 +1,4 @@
-"""Prepare the command line before the rest of friso is imported, with hardly any imports of its own.
+"""Prepare the command line before the rest of friso is imported.
 
 A signal during the import is remembered. No module is loaded from the current folder, which may belong to someone else.
 The module has no effect if friso is used as a library.

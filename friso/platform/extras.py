@@ -1,4 +1,4 @@
-"""List optional dependencies ("extras") that a few commands need, and say how to install them."""
+"""List optional dependencies ("extras") of commands, and say how to install them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ PATIENCE = 60.0
 
 
 class HelperProcess:
-    """A process that runs a module, which calls `answer_questions`; `paths` are its import paths."""
+    """A process that runs a module with `answer_questions`; `paths` are its import paths."""
 
     def __init__(self, module: str, *arguments: str, paths: Iterable[str]) -> None:
         self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives

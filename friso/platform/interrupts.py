@@ -1,4 +1,4 @@
-"""End the command line with one line on Ctrl-C, a termination or a closed terminal, at any time.
+"""End the command line with one line on Ctrl-C, termination or a closed terminal.
 
 Importing friso and its libraries takes up to a second. An exception in this time is lost, or ends in a traceback from a
 half-loaded library. So a signal raises KeyboardInterrupt only while no import is under way. Before the command begins,

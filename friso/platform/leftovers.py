@@ -1,6 +1,6 @@
-"""Manage folders that a process keeps locked, by a file in them, for as long as it uses them.
+"""Manage folders that a process keeps locked while it uses them.
 
-The folder of a process that was killed is a leftover.
+The lock is a file in the folder. The folder of a process that was killed is a leftover.
 """
 
 from __future__ import annotations

@@ -107,7 +107,10 @@ if sys.platform == "win32":
             once_free(partial(path.rename, path))  # has no effect, but needs the same rights
 
     def name_new_file(draft: Path, path: Path) -> None:
-        """Rename a draft to a path where nothing exists. Raises OSError, FileExistsError if something does."""
+        """Rename a draft to a path where nothing exists.
+
+        Raises OSError, FileExistsError if something does.
+        """
         once_free(partial(draft.rename, path))
 
     def rename_folder(folder: Path, path: Path) -> None:
@@ -166,10 +169,10 @@ if sys.platform == "win32":
         return f"{cause}; a path of {length} characters, which Windows takes only if long paths are enabled"
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Return in words who, besides this user and root, may write to a file or folder; "" for nobody.
+        """Return who, besides this user and root, may write to a file or folder; "" for nobody.
 
-        For a folder this means replacing its files. In a folder with the sticky bit (/tmp), everybody may only replace
-        their own files.
+        The answer is in words. For a folder this means replacing its files. In a folder with the sticky bit (/tmp),
+        everybody may only replace their own files.
         """
         return ""
 
@@ -189,7 +192,7 @@ else:
 
     @contextmanager
     def interrupts_held() -> Iterator[None]:
-        """Ctrl-C waits; processes started meanwhile never see it."""
+        """Hold Ctrl-C back until the `with` block ends; processes started within never see it."""
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
@@ -197,32 +200,38 @@ else:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def signal_later(seconds: float, handler: Callable[[int, FrameType | None], object]) -> None:
-        """Have a handler called in the main thread after some time, as for SIGALRM."""
+        """Have a handler of SIGALRM called in the main thread after some time [s]."""
         signal.signal(signal.SIGALRM, handler)
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
     def no_signal_later() -> None:
-        """Have it not called after all: Python's end takes its handlers away, and SIGALRM would kill the process."""
+        """Cancel the timer of `signal_later`.
+
+        Python removes its handlers as it ends, and SIGALRM would then kill the process.
+        """
         signal.setitimer(signal.ITIMER_REAL, 0)
 
     def signals_told() -> int:
-        """A descriptor from which the numbers of signals can be read as they come, a byte each."""
+        """Return a descriptor from which the numbers of signals can be read as they come, a byte each."""
         outlet, inlet = os.pipe()
         os.set_blocking(inlet, False)
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
         return outlet
 
     def _may_be_held(error: OSError) -> bool:
-        """False: no program keeps others from a file."""
+        """Return False: on this system no program keeps others from a file."""
         return False
 
     def check_free(path: Path) -> None:
-        """Raises OSError where a file cannot be replaced, since it is read-only, for root too."""
+        """Raise OSError if a file cannot be replaced because it is read-only, for root as well."""
         if not (os.access(path, os.W_OK) and path.stat().st_mode & 0o222):
             raise OSError(errno.EROFS, "it is read-only", str(path))
 
     def name_new_file(draft: Path, path: Path) -> None:
-        """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""
+        """Rename a draft to a path where nothing exists.
+
+        Raises OSError, FileExistsError if something does.
+        """
         try:
             os.link(draft, path)
         except OSError as error:
@@ -233,31 +242,34 @@ else:
             draft.unlink()
 
     def rename_folder(folder: Path, path: Path) -> None:
-        """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""
+        """Rename a folder. Raises OSError, also if anything but an empty folder is in the way."""
         folder.rename(path)
 
     def name_refused(path: Path) -> str:
-        """ "": names are as one likes."""
+        """Return "", because this system accepts any name."""
         return ""
 
     def shell_word(word: str) -> str:
-        """A word of a command as a shell takes it, in quotes that cmd and PowerShell take too where there are such."""
+        """Return a word of a command quoted for a shell, if possible also for cmd and PowerShell."""
         if re.fullmatch(r"[\w.,:/=@%+-]+", word):
             return word
         return shlex.quote(word) if set('"$`\\!') & set(word) or not word else _quoted(word)
 
     @contextmanager
     def closed_pipes_told() -> Iterator[None]:
-        """Writing within to a stream that nobody reads any more raises BrokenPipeError, as it does anyway."""
+        """Do nothing: here, writing to a stream without a reader raises BrokenPipeError anyway."""
         yield
 
     def cause_of(error: OSError) -> str:
-        """Why a file or a folder could not be used."""
+        """Return why a file or a folder could not be used."""
         return error.strerror or str(error)
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Who else than this user and root may write to a file, or exchange what this user has in a folder, in words;
-        "" for nobody. In a folder with the sticky bit (/tmp) everybody may exchange but what is their own."""
+        """Return who, besides this user and root, may write to a file or folder; "" for nobody.
+
+        The answer is in words. For a folder this means replacing its files. In a folder with the sticky bit (/tmp),
+        everybody may only replace their own files.
+        """
         if status.st_uid not in (0, os.geteuid()):
             return "belongs to another user"
         sticky = stat.S_ISDIR(status.st_mode) and status.st_mode & stat.S_ISVTX
@@ -266,16 +278,18 @@ else:
         return ""
 
     def is_users_own(status: os.stat_result) -> bool:
-        """Whether a file belongs to this user."""
+        """Tell whether a file belongs to this user."""
         return status.st_uid == os.geteuid()
 
     def is_open_to_others(status: os.stat_result) -> bool:
-        """Whether others than this user may read a file, or write to it."""
+        """Tell whether other users may read a file, or write to it."""
         return bool(status.st_mode & 0o077)
 
     def closed_to_others(folder: Path) -> os.stat_result:
-        """The status of a folder, once nobody else may look into it if it is the user's own; another's is left as it
-        is."""
+        """Close a folder of this user to others, and return its status.
+
+        The folder of another user is left as it is.
+        """
         status = folder.lstat()
         if status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) != 0o700:
             folder.chmod(0o700)
@@ -349,7 +363,10 @@ if sys.platform == "linux":
         return min((_quota(above) for group in groups for above in (group, *group.parents)), default=math.inf)
 
     def _quota(group: Path) -> float:
-        """Return the quota of processor time of one group, in cores; infinite without a limit ("max", or -1)."""
+        """Return the quota of processor time of one group, in cores.
+
+        The quota is infinite without a limit ("max", or -1).
+        """
         for names in (("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
             with suppress(OSError, ValueError):
                 quota, period = " ".join((group / name).read_text(encoding="ascii") for name in names).split()
@@ -360,7 +377,10 @@ if sys.platform == "linux":
 else:
 
     def usable_cores() -> int:
-        """Number of processor cores; neither macOS nor Windows confines a process to some of them by default."""
+        """Return the number of processor cores.
+
+        Neither macOS nor Windows confines a process to some of them by default.
+        """
         return os.cpu_count() or 1
 
 

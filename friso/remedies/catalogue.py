@@ -1,4 +1,4 @@
-"""List the remedies with the keys that each one changes, from the smallest change to the largest."""
+"""List the remedies with the keys that they change, the smallest change first."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 
 @dataclass(frozen=True)
 class Remedy:
-    """A remedy: its `name`, the stage from which it starts, and the variables that it changes, in order.
+    """A remedy: its `name`, the stage from which it starts, and the variables it changes.
 
     `buys_joint` tells that it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
     joint this remedy builds from leaf springs.
@@ -107,7 +107,7 @@ def with_bandwidth(remedy: Remedy) -> Remedy:
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
-    """Return the remedy that varies all gains, if the controller has more gains than its bandwidth."""
+    """Return the remedy that varies all gains, if the bandwidth is not the only gain."""
     several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
@@ -144,7 +144,7 @@ def _reaches(stage: Stage, goal: Goal) -> bool:
 
 
 def _structures(stage: Stage) -> Iterator[Remedy]:
-    """Yield remedies with the other structures of the stage's controller, each varying all its gains."""
+    """Yield remedies with other structures of the stage's controller, varying all gains."""
     flat = stage.flat()
     stands = not pieces(flat, 1)[..., 2:].any()  # a jump of the reference, or a release
     for name, changes in controller_of(flat).structures(flat).items():
@@ -169,7 +169,7 @@ def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Yield each setting against friction that the stage does not use yet, as a remedy of its own."""
+    """Yield each unused setting against friction, as a remedy of its own."""
     flat = stage.flat()
     if breakaway(flat) <= 0:
         return

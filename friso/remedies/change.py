@@ -1,4 +1,4 @@
-"""Measure the size of a change of a stage: parts bought, keys changed, and the factor of the change."""
+"""Measure the size of a change: parts bought, keys changed, and the factor of change."""
 
 from __future__ import annotations
 

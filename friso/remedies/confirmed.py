@@ -46,7 +46,10 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return the parts that are not confirmed, by names of `friso.questions.tune.present_words.DOUBTS`."""
+        """Return the unconfirmed parts, by names of `DOUBTS`.
+
+        The names are in `friso.questions.tune.present_words`.
+        """
         if self.word is None:
             return ("given up",)
         parts = {
@@ -60,7 +63,7 @@ class Confirmation:
 
 @np.errstate(all="ignore")
 def confirmed(stage: Stage, goal: Goal) -> Confirmation:
-    """Judge a stage at its own bandwidth, and at lower and higher ones within the goal's distance.
+    """Judge a stage at its own bandwidth, and at others within the goal's distance.
 
     The bandwidths lie closer together than those at which `friso check` looks for an edge of hunting, and each is
     searched from more starts.

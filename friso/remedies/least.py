@@ -1,4 +1,4 @@
-"""Find the smallest change of a controller that meets the goal, starting from settings that do."""
+"""Find a controller's smallest change that meets the goal, from settings that do."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
-    """Yield the smallest changes found for a remedy of `least_remedy`, each of shape (variables,).
+    """Yield the smallest changes for a remedy of `least_remedy`, each of shape (variables,).
 
     Fewer keys come first, then smaller factors. Single keys are tried first, because any change of one key counts as
     smaller than a change of several. Only changes smaller than `most` are returned (see `change_costs`).
@@ -153,7 +153,7 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Return the coordinates of the present and of the working numbers, from 0 to 1, (variables, 2)."""
+    """Return the coordinates of present and working numbers, from 0 to 1, (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 

@@ -1,4 +1,4 @@
-"""Draw machines around a stage, each with its own move, and apply changes of the stage to all."""
+"""Draw machines around a stage, each with its own move, and apply changes to all."""
 
 from __future__ import annotations
 

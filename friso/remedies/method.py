@@ -1,4 +1,4 @@
-"""Run the method of `friso tune`: optimise each remedy separately, and verify its best points."""
+"""Run the method of `friso tune`: optimise each remedy, and verify its best points."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
 
 
 def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full; they come with the smallest change first.
+    """Choose which working remedies to describe in full, the smallest change first.
 
     The choice is the smallest change and the one that settles soonest; if these are the same, the next larger change
     follows.
@@ -493,7 +493,7 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Record the outcome of the first of a few points that is verified, or else of the first one.
+        """Record the outcome of the first verified one of a few points, or else of the first.
 
         A point that is not verified is not sure to work.
         """
@@ -566,7 +566,7 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """Return the settings against friction that came closest to the goal, combined with the bandwidth.
+    """Return the settings against friction closest to the goal, combined with the bandwidth.
 
     They are tried only if no change of the controller alone works.
     """

@@ -55,7 +55,7 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations of one part for a remedy, or else those of two or three parts."""
+    """Return the cheapest relaxations of one part for a remedy, or else of two or three."""
     settings = RemedySettings.current()
     needed = _needed(points, goal)
     far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
@@ -71,7 +71,7 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations for a remedy if the parts in `limited` may be relaxed only so far."""
+    """Return the cheapest relaxations for a remedy within the bounds of `limited` parts."""
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)

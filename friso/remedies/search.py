@@ -94,7 +94,7 @@ class TriedPoints:
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
-        """Return the numbers of points that serve moves up to the `largest` [m] but not the small ones.
+        """Return the numbers of points that serve only the larger moves, up to `largest` [m].
 
         They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
         """
@@ -172,7 +172,7 @@ class Search:
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
-        """Try points (points, variables) a few at a time, and return the ones that break no constraint."""
+        """Try points (points, variables) in batches, and return those that break no constraint."""
         tuning = RemedySettings.current()
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
@@ -183,7 +183,7 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield points (variables,) for closer inspection, until the next one takes too much work (`cut`)."""
+        """Yield points (variables,) for inspection, until the next takes too much work (`cut`)."""
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -262,7 +262,10 @@ class Search:
         return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
-        """Return the places between grid points at which one variable reaches the bandwidth limit from below."""
+        """Return the places between grid points where a variable reaches the bandwidth limit.
+
+        The limit is reached from below.
+        """
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
         if limit is None:
@@ -339,7 +342,10 @@ class Search:
         return so_far()
 
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-        """Return the points that break no constraint on all machines, the best first (see `surveyed`)."""
+        """Return the points that break no constraint on any machine, the best first.
+
+        See `surveyed`.
+        """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
             self.tried.append(self.measured(batch[left]))
@@ -358,10 +364,10 @@ class Search:
         return np.asarray(clear)
 
     def share(self, shares: np.ndarray) -> np.ndarray:
-        """Return the fraction of fresh machines that meet the goal by moves and margins at points, (points,).
+        """Return the fraction of fresh machines that meet the goal at points, (points,).
 
-        `shares` has shape (points, variables). If too many machines lack the margin, the fraction with enough margin is
-        returned.
+        Only moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the
+        fraction with enough margin is returned.
         """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
@@ -453,9 +459,9 @@ class Search:
 
 
 def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the smallest move from which all machines settle (points, machines), shape (points,).
+    """Return the smallest move from which all machines settle, (points,).
 
-    It is infinite where the machine with the largest move does not settle.
+    Moves have shape (points, machines). It is infinite where the machine with the largest move does not settle.
     """
     order = np.argsort(-sizes, kind="stable")
     count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
@@ -463,17 +469,20 @@ def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 
 def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-    """Return the quantity by which points are sorted, (n,): the settling time, or `wanted` if given."""
+    """Return the quantity that sorts points, (n,): the settling time, or `wanted` if given."""
     return points.settling if wanted is None else wanted(points.shares)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell which points (points, variables) are equal to which of the others, shape (points, others)."""
+    """Tell which points (points, variables) equal which of the others, (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the distance of points (points, variables) from the nearest other, (points,); infinite without others."""
+    """Return the distance of points from the nearest other, (points,).
+
+    Points have shape (points, variables). The distance is infinite without others.
+    """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 

@@ -1,4 +1,4 @@
-"""Differentiate limit cycle, edge of hunting, settling time and modulus margin by keys of the stage file."""
+"""Differentiate cycle, edge of hunting, settling time and margin by the file's keys."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class EdgeDerivatives:
 
 @dataclass(frozen=True)
 class SettlingDerivatives:
-    """The settling `time` [s] of the stage's own move, and its derivatives by keys [s per SI unit], (keys,).
+    """The settling `time` [s] of the stage's own move, and its derivatives [s/SI], (keys,).
 
     The time runs from the last corner of the reference until the stage stays `within` [m]. It jumps where a turning
     point crosses the edge of the band. `jump` is the distance of the nearest turning point from that edge, over the
@@ -80,7 +80,7 @@ class SettlingDerivatives:
 
 @dataclass(frozen=True)
 class MarginDerivatives:
-    """The least modulus margin of all settled states, and its derivatives by keys [1/SI], (keys,).
+    """The least modulus margin of all settled states, and its derivatives [1/SI], (keys,).
 
     They hold for the state and the frequency at which the loop comes closest to -1.
     """
@@ -175,7 +175,10 @@ def sensitivity(
 
 
 def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
-    """Return the derivatives of the edge of hunting and of the margin by all keys in the equations."""
+    """Return the derivatives of the edge of hunting and of the margin by all keys.
+
+    Only keys in the equations count.
+    """
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat)
     values = np.array([flat[name] for name in names])

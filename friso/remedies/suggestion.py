@@ -71,7 +71,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
 
 
 def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
-    """Return the coordinates, from 0 to 1, of stroke [m], force and damping ratio of a joint remedy.
+    """Return coordinates, from 0 to 1, of a joint's stroke [m], force and damping ratio.
 
     The scale is logarithmic. The force is `RemedySettings.suggested_force`.
     """

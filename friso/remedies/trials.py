@@ -42,7 +42,7 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """Return the settling time [s] that a fraction `share` of the machines keeps at each point, (points,)."""
+        """Return the settling time [s] that a fraction `share` of machines keeps, (points,)."""
         return quantile(self.settling, share)
 
 
@@ -56,7 +56,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """Simulate the moves of points, with coordinates (points, variables) from 0 to 1 over a remedy's ranges.
+    """Simulate the moves of points (points, variables), from 0 to 1 over a remedy's ranges.
 
     The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
     """
@@ -85,7 +85,7 @@ def timing(drive: Stage) -> dict[str, float]:
 def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
-    """Return the least modulus margin of the limit cases, shape (points, machines); 0 if one is unstable.
+    """Return the limit cases' least modulus margin, (points, machines); 0 if unstable.
 
     Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by the factor `slower`.
     Controllers with other gains at standstill get the smaller margin of both sets.

@@ -1,4 +1,4 @@
-"""Define the variables of an optimiser: numbers on logarithmic scales, and the keys that follow from them."""
+"""Define an optimiser's variables on logarithmic scales, and the keys that follow."""
 
 from __future__ import annotations
 

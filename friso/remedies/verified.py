@@ -65,7 +65,7 @@ class Performance:
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
-        """Return the 95 % interval of the time in which 95 % settle, taking the machines as a sample."""
+        """Return the 95 % interval of the time in which 95 % settle, from sampled machines."""
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
@@ -133,10 +133,10 @@ class Performance:
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
-        """Return the performance with a survey for hunting of the machines that meet all other parts.
+        """Return the performance after a survey of the machines that meet all other parts.
 
-        A few machines are surveyed first. If so many of them hunt that too few can meet the goal, the others are left
-        out: the fraction is then one of fewer machines.
+        The survey looks for hunting. A few machines are surveyed first. If so many of them hunt that too few can meet
+        the goal, the others are left out: the fraction is then one of fewer machines.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
@@ -147,7 +147,7 @@ class Performance:
     def _surveyed(
         self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
     ) -> Performance:
-        """Return the performance after surveying numbered machines that meet all other parts of the goal."""
+        """Return the performance after surveying numbered machines that meet all other parts."""
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:
             return self
@@ -231,7 +231,7 @@ class RemedyOutcome:
 
 @np.errstate(all="ignore")
 def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure the moves and margins of a stage on machines, without a survey for hunting (see `surveyed`)."""
+    """Measure a stage's moves and margins on machines, without a survey (see `surveyed`)."""
     flat = stage.flat()
     return Performance(
         **_measured(stage, machines, goal, drive),
@@ -243,7 +243,7 @@ def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performan
 
 
 def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[str, Any]:
-    """Measure moves and margins on machines; return them by field of `Performance`, not surveyed yet."""
+    """Measure moves and margins on machines, by field of `Performance`, without a survey."""
     remedy = Remedy.settled_on("", stage)
     return {
         "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),

@@ -1,4 +1,4 @@
-"""Find the range of each number in which an answer holds while all other numbers stay as tuned."""
+"""Find the range of each number in which an answer holds, all others staying as tuned."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from friso.remedies.settings import RemedySettings
 
 @dataclass(frozen=True)
 class VariableWindow:
-    """Range from `low` to `high` of a variable around its tuned `value`, in which machines meet the goal.
+    """Range of a variable around its tuned `value`, in which machines meet the goal.
 
-    All three are in SI, or factors; everything else is as tuned. `open_below` and `open_above` tell that the range
-    reaches an end of the search.
+    The range is from `low` to `high`. All three are in SI, or factors; everything else is as tuned. `open_below` and
+    `open_above` tell that the range reaches an end of the search.
     """
 
     name: str

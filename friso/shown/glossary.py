@@ -57,7 +57,7 @@ def _any_word() -> re.Pattern[str]:
 
 
 class Glossary:
-    """The rows of the glossary that one page uses, in the order in which their words first occur."""
+    """The rows of the glossary used by one page, by the first occurrence of their words."""
 
     def __init__(self) -> None:
         self.used: dict[str, GlossaryRow] = {}

@@ -1,4 +1,4 @@
-"""Say how a stage follows its reference, where that rests, and which limits moves do not reach."""
+"""Say how a stage follows its reference, and which limits moves do not reach."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def off_its_reference(largest: float, rms: float) -> str:
 
 
 def dwell_sentences(dwells: Sequence[Dwell]) -> list[str]:
-    """Say how a stage settles at each of several places where its reference stands, the slowest first."""
+    """Say how a stage settles at each place where its reference stands, the slowest first."""
     if not dwells:
         return []
     texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells]

@@ -1,4 +1,7 @@
-"""Check the types of arguments by their annotations; a wrong type gives an InputError that names the argument."""
+"""Check the types of arguments by their annotations.
+
+A wrong type gives an InputError that names the argument.
+"""
 
 from __future__ import annotations
 

@@ -28,7 +28,10 @@ def _falls(flat: Mapping[str, Any]) -> Any:
 
 
 class Conditions(UncertainSection):
-    """Where on its rail, under what load and how warm the guide is: factors on static and Coulomb friction."""
+    """Place on the rail, load and temperature of the guide.
+
+    They give factors on static and Coulomb friction.
+    """
 
     place: Annotated[Value | None, Quantity("m", any_sign, "120 mm")] = None
     """Place on the rail whose friction factors apply ([rail]). A drive as built moves along the rail instead."""

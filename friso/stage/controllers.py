@@ -136,7 +136,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def declare(cls, measured: Any, blocks: Any, variant: Any) -> Mapping[str, Any]:
-        """Return the terms of the force [N], each a signal made by `blocks` from the `measured` inputs.
+        """Return the terms of the force [N], made by `blocks` from the `measured` inputs.
 
         See `friso.equations.blocks`.
         """
@@ -190,7 +190,7 @@ class ControllerSection(AgainstFriction):
 
 
 class Controllers(Variants):
-    """Registry of controllers: their kinds, each with one form or several, distinguished by their keys."""
+    """Registry of controllers by kind; forms of one kind are distinguished by their keys."""
 
     def __init__(self) -> None:
         super().__init__("kind", "friso.controllers")
@@ -253,7 +253,7 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a controller's keys that depend on other keys of the stage, at their present values.
+    """Return the controller's keys that depend on other keys, at their present values.
 
     They then stay as tuned for the machine of the stage file, if the machine changes.
     """

@@ -1,4 +1,7 @@
-"""The tables [[controller.filters]]: transfer functions of up to the second order, in the order of the signal."""
+"""The tables [[controller.filters]]: transfer functions of up to second order.
+
+They are in the order of the signal.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ class Transfer(NamedTuple):
 
 
 class FilterSection(UncertainSection):
-    """Base of the filters, each of which declares its keys, `kind: Literal["name"]`, and its transfer function."""
+    """Base of the filters, which declare keys, `kind: Literal["name"]`, and transfer function."""
 
     kind: Any
     path: Literal["forward", "feedback"] = FORWARD

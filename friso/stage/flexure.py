@@ -1,4 +1,4 @@
-"""The [flexure] table: leaf springs instead of the stiffness of a joint and its parasitic mode."""
+"""The [flexure] table: leaf springs instead of joint stiffness and parasitic mode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""List controllers and friction laws from outside friso, for `friso --help` and every report."""
+"""List controllers and friction laws from outside friso, for `--help` and reports."""
 
 from friso.stage.controllers import CONTROLLERS
 from friso.stage.plug_ins import load_installed, plug_in_of

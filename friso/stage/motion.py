@@ -26,7 +26,10 @@ class ReferenceForm(NamedTuple):
 
     @property
     def inputs(self) -> int:
-        """Return how many numbers describe a piece: derivatives, direction, and four for each sinusoid."""
+        """Return how many numbers describe a piece of the reference.
+
+        They are derivatives, direction, and four for each sinusoid.
+        """
         return 1 + self.degree + (1 + 4 * self.tones if self.tones else 0)
 
 
@@ -35,7 +38,10 @@ QUADRATIC = ReferenceForm()
 
 
 class Tone(NamedTuple):
-    """A sinusoid: amplitude [m], initial phase [turns], frequency [Hz], and rise of frequency [Hz/s]."""
+    """A sinusoid: amplitude [m], phase [turns], frequency [Hz], and its rise [Hz/s].
+
+    The phase is the initial one.
+    """
 
     amplitude: Any
     turns: Any
@@ -134,7 +140,10 @@ class Motion(UncertainSection):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the keys that change when a move becomes longer by a factor; none if there is no move."""
+        """Return the keys that change when a move becomes longer by a factor.
+
+        There are none without a move.
+        """
         return {}
 
     @staticmethod

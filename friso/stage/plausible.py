@@ -1,4 +1,4 @@
-"""Warn of stage files that are valid but probably wrong: implausible values, and an unused encoder."""
+"""Warn of valid but probably wrong stage files: implausible values, unused encoders."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
 
 
 def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
-    """Yield the units in which a mass may have been meant, and the factor by which each changes it."""
+    """Yield the units in which a mass may have been meant, with the factors of change."""
     written = _written(stage, key)
     unit = written.partition(" ")[2].strip()
     if stage.axis_kind == ROTARY or unit not in _MASS.units:

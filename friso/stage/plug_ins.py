@@ -92,9 +92,10 @@ def load_own(group: str) -> None:
 
 @cache
 def load_installed(group: str) -> None:
-    """Import the modules of installed packages in a group of entry points, to register their sections.
+    """Import the modules of installed packages in a group of entry points.
 
-    A package that cannot be imported, or registers a name that is taken, is reported and skipped.
+    The modules register their sections. A package that cannot be imported, or registers a name that is taken, is
+    reported and skipped.
     """
     for name, module in installed_modules(group).items():
         try:

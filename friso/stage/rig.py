@@ -45,7 +45,7 @@ def is_as_built(stage: Any) -> bool:
 
 
 def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
-    """Say which of the `tables` an analysis of the ideal machine leaves out; "" if the stage has none."""
+    """Say which of the `tables` an ideal-machine analysis leaves out; "" if none."""
     placed = stage.conditions is not None and stage.conditions.place is not None
     left = [name for name in tables if getattr(stage, name) and not (name == "rail" and placed)]
     if not left:
@@ -102,7 +102,10 @@ def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
 
 
 class Drive(UncertainSection):
-    """How the controller is carried out: friso bode reads timing, discretisation, current loop; friso rig all of it."""
+    """How the controller is carried out.
+
+    `friso bode` reads timing, discretisation and current loop; `friso rig` reads all of it.
+    """
 
     sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
@@ -185,9 +188,10 @@ def _total(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
 
 
 class Rail(UncertainSection):
-    """How the bearing varies along the rail: factors of position for static and for Coulomb friction.
+    """How friction varies along the rail: factors of static and of Coulomb friction.
 
-    Factor = (1 + offset) (1 + harmonics of the rolling elements) (random field of mean 1).
+    The factors depend on the position. Factor = (1 + offset) (1 + harmonics of the rolling elements) (random field of
+    mean 1).
     """
 
     seed: Annotated[float, Number(seeds, "1")]

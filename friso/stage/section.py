@@ -1,4 +1,4 @@
-"""Define the base of all tables of a stage file: strict keys, readable errors, rules, and variants."""
+"""Define the base of all stage-file tables: strict keys, errors, rules, and variants."""
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
@@ -28,7 +28,10 @@ from friso.stage.plug_ins import load_installed, load_own, plug_in_of
 
 @dataclass(frozen=True)
 class Rule:
-    """A condition between keys; `holds` gets the flat SI mapping of `Stage.flat`, arrays allowed."""
+    """A condition between keys; `holds` gets the flat SI mapping of `Stage.flat`.
+
+    The values may be arrays.
+    """
 
     keys: tuple[str, ...]
     holds: Callable[[Mapping[str, Any]], Any]
@@ -99,7 +102,10 @@ class Section(BaseModel):
 
 
 class UncertainSection(Section):
-    """A table whose quantities may be uncertain, "20 N +/- 1 N" or "1 N .. 3 N": their value is the centre."""
+    """A table with uncertain quantities, "20 N +/- 1 N" or "1 N .. 3 N".
+
+    The value of such a quantity is the centre.
+    """
 
     @field_validator("*", mode="wrap")
     @classmethod
@@ -131,13 +137,16 @@ class UncertainSection(Section):
         return values
 
     def uncertain(self) -> dict[str, Interval]:
-        """Return the intervals of the uncertain quantities by key; intervals without width are left out."""
+        """Return the intervals of the uncertain quantities by key.
+
+        Intervals without width are left out.
+        """
         values = {key: value.interval for key, value in self.numbers.items() if isinstance(value, UncertainValue)}
         return {key: interval for key, interval in values.items() if interval.low < interval.high}
 
 
 def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
-    """Return the value of an array's element, uncertain if its text has a range. Raises InputError."""
+    """Return an array element's value, uncertain if its text has a range. Raises InputError."""
     text = getattr(value, "text", value)
     return uncertain_value(text, field) if is_range(text) else field.read(value)
 
@@ -147,7 +156,7 @@ SectionClass = TypeVar("SectionClass", bound=type[Section])
 
 @dataclass(frozen=True)
 class Table:
-    """A key that takes a table: `pick` chooses the section class for the table, `example` shows one."""
+    """A key that takes a table: `pick` chooses the section class, `example` shows a table."""
 
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str

@@ -281,14 +281,17 @@ class Stage(Section):
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
-        """Return the numeric keys that may be swept; keys that follow from leaf springs are excluded."""
+        """Return the numeric keys that may be swept.
+
+        Keys that follow from leaf springs are excluded.
+        """
         keys = numeric_keys(self._declared)
         if not self.flexure:
             return keys
         return {key: item for key, item in keys.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
 
     def uncertain(self) -> dict[str, Interval]:
-        """Return the intervals of the uncertain quantities by dotted key; `flat` holds their centres.
+        """Return the intervals of uncertain quantities by dotted key; `flat` has their centres.
 
         All values in a "range" are equally likely; a "tolerance" is the 95 % interval of a normal distribution.
         """

@@ -1,4 +1,4 @@
-"""Declare the keys of [controller] against friction, which drives have beside any controller."""
+"""Declare the keys of [controller] against friction, which any controller may have."""
 
 from __future__ import annotations
 

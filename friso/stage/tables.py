@@ -21,7 +21,7 @@ from friso.stage.section import Section, UncertainSection, Variants
 
 
 class AxisTable(UncertainSection):
-    """Which units the stage file is in: on a rotary axis kg m^2, N m and rad stand for kg, N and m."""
+    """Units of the stage file: on a rotary axis kg m^2, N m and rad replace kg, N and m."""
 
     kind: Literal["linear", "rotary"] = "linear"
 
@@ -65,7 +65,7 @@ class Masses(UncertainSection):
 
 
 class FrictionSection(UncertainSection):
-    """Base of the friction laws, each of which declares its keys, `model: Literal["name"]`, and its equations."""
+    """Base of the friction laws, which declare keys, `model: Literal["name"]`, and equations."""
 
     model: Any
     decisive: ClassVar[tuple[str, ...]] = ()
@@ -124,7 +124,7 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity that the stage violates; "" if it is passive or undeclared.
+        """Return the condition of passivity that the stage violates; "" if passive or undeclared.
 
         A law that is not passive returns more energy than it received, as no real friction does.
         """
@@ -199,7 +199,7 @@ ROUNDING = 1e-12
 
 
 class StatedMoves(Section):
-    """The moves that the machine makes, uniform in the logarithm: friso tune draws one for each machine.
+    """The machine's moves, uniform in the logarithm: friso tune draws one per machine.
 
     Without accelerations, all moves have that of [motion].
     """

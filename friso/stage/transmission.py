@@ -1,4 +1,4 @@
-"""The tables [transmission], [motor_friction] and [encoder]: what stands between the motor and the load."""
+"""The tables [transmission], [motor_friction] and [encoder] between motor and load."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Side = Literal["motor", "load"]
 
 
 class Transmission(UncertainSection):
-    """A screw, belt or gear: what the motor weighs at the load, and the spring that connects them."""
+    """A screw, belt or gear: the motor's mass at the load, and the connecting spring."""
 
     mass: Annotated[Value | None, Quantity("kg", positive, "2 kg")] = None
     """Mass of everything that moves with the motor, reflected to the load; alternatively its `inertia` with `lead` or
@@ -61,20 +61,20 @@ class Transmission(UncertainSection):
 
 
 class Encoder(UncertainSection):
-    """On which side of the transmission position and velocity are measured that the controller acts on."""
+    """Sides of the transmission on which the controller's position and velocity are measured."""
 
     position: Side
     velocity: Side
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the motor's mass converted to the load [kg], from its inertia; None without an inertia."""
+    """Return the motor's mass at the load [kg], from its inertia; None without an inertia."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the flat keys with the motor's friction under [friction], if the guide has no friction."""
+    """Return the flat keys with the motor's friction as [friction], if the guide has none."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 

@@ -207,7 +207,7 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Tell whether one branch of cycles is stable just below and just above a value of the swept key.
+    """Tell whether a branch of cycles is stable just below and above a value of the swept key.
 
     False if a branch is in doubt at this value.
     """
@@ -329,7 +329,7 @@ def curve_meetings(result: Plane) -> list[Meeting]:
 
 
 def lost_places(result: Plane) -> np.ndarray:
-    """Return the places [SI] where a change was seen but no curve could be begun, shape (places, 2)."""
+    """Return the places [SI] of a change where no curve could be begun, (places, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 

@@ -94,7 +94,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 @dataclass(frozen=True)
 class DrawnEdges:
-    """Edges of hunting of drawn stages in bandwidth [Hz], (count,), each between `low` and `high`.
+    """Edges of hunting of drawn stages in bandwidth [Hz], (count,), from `low` to `high`.
 
     Both are NaN for a stage whose hunting does not begin or end within the tried bandwidths.
     """
@@ -104,9 +104,9 @@ class DrawnEdges:
 
 
 def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
-    """Find the edge of hunting in bandwidth of the first drawn stages, near the stage's own `margin`.
+    """Find the edge of hunting of the first drawn stages, near the stage's own `margin`.
 
-    Returns None if there is no margin, or no key states a bandwidth.
+    The edge is one in bandwidth. Returns None if there is no margin, or no key states a bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())

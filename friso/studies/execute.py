@@ -80,7 +80,7 @@ class Crew:
             yield from ((study, block) for block in study.blocks(shape))
 
     def _result(self, future: Future[Columns]) -> Columns:
-        """Return the result of a task. Raises RuntimeError if the executor failed, and any error of the task."""
+        """Return a task's result. Raises RuntimeError if the executor fails, and the task's errors."""
         with self._blamed():
             return future.result()
 

@@ -1,4 +1,4 @@
-"""Compare limit cycles by harmonic balance with simulated ones, which shows where it misleads."""
+"""Compare limit cycles by harmonic balance with simulated ones, to show its errors."""
 
 from __future__ import annotations
 

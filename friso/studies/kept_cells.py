@@ -1,4 +1,4 @@
-"""Store the results of cells until a refined study is done, so that a resumed study repeats no runs."""
+"""Store results of cells until a refined study is done, so that none is run twice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evaluate links: expressions such as "0.7 * mass" for stage keys that follow the axes of a study.
+"""Evaluate links: expressions such as "0.7 * mass" for keys that follow a study's axes.
 
 Numbers without a unit are in SI.
 """

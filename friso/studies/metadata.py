@@ -1,4 +1,4 @@
-"""Store and check the metadata of a store: one file (.zmetadata) with its digest, and a copy for repair.
+"""Store and check a store's metadata: one file (.zmetadata) with its digest, and a copy.
 
 Zarr's readers take everything but the numbers from this file. Files beside the arrays repeat it for other programs, and
 are rewritten if they differ. The file also has friso's own notes: the digests of the axes, and colours of the figures
@@ -74,7 +74,7 @@ class Metadata:
         return dict(self.files[_ATTRIBUTES])
 
     def damaged_files(self, path: Path) -> list[str]:
-        """Return the metadata files of the store at `path` whose content differs from these metadata."""
+        """Return the metadata files of the store at `path` that differ from these metadata."""
         return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Sample adaptively: outcomes over a grid four times finer per axis, for a fifth of its runs.
+"""Sample adaptively: a grid four times finer per axis, for a fifth of its runs.
 
 A lattice of every second cell of the given grid is run first. Where neighbouring cells differ, both are run, until
 every change of outcome (or of verdict, if computed) has been seen from both sides; so a boundary that was met once is

@@ -1,4 +1,7 @@
-"""Draw samples of several keys at once: Sobol points and Latin hypercubes, through `scipy.stats.qmc`."""
+"""Draw samples of several keys at once: Sobol points and Latin hypercubes.
+
+They come from `scipy.stats.qmc`.
+"""
 
 from __future__ import annotations
 

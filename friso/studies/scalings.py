@@ -1,4 +1,4 @@
-"""Define axes of a map that multiply several keys: speed of the controller, and level of friction."""
+"""Define map axes that multiply several keys: controller speed and friction level."""
 
 from __future__ import annotations
 

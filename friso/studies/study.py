@@ -1,4 +1,4 @@
-"""Define a study as data: a stage, its variations and tolerance, its cells and blocks of cells."""
+"""Define a study as data: a stage, variations, tolerance, cells, and blocks of cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run parameter studies into an xarray Dataset in memory, or into a store that can be resumed."""
+"""Run parameter studies into an xarray Dataset, or into a store that can be resumed."""
 
 from __future__ import annotations
 

@@ -26,18 +26,19 @@ TRIED = 400
 
 
 def checked_share(share: float) -> float:
-    """Return the fraction of cells to verify. Raises InputError for a number that is no fraction."""
+    """Return the fraction of cells to verify. Raises InputError if it is no fraction."""
     if not 0 <= share <= 1:
         raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
 
 
 def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a fraction of the cells again at rtol/100; return attributes with the fraction that survived.
+    """Run a fraction of the cells again at rtol/100; return the fraction that survived.
 
-    A study always verifies the same cells. In a refined map, inferred cells are run too, and counted apart
-    (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive. Nothing is
-    returned if there are no others, no fraction was asked for, or the attributes of the runs state it already.
+    It is returned as attributes. A study always verifies the same cells. In a refined map, inferred cells are run too,
+    and counted apart (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could
+    survive. Nothing is returned if there are no others, no fraction was asked for, or the attributes of the runs state
+    it already.
     """
     settings = StudySettings.current()
     if (

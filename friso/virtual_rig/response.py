@@ -1,4 +1,7 @@
-"""Compute the time response of a stage with its real drive in its surroundings, for `friso simulate`."""
+"""Compute the time response of a stage with its real drive, for `friso simulate`.
+
+The surroundings are included.
+"""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 
 
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
-    """Return the task of moving from place to place [m], standing for a time [s] after each move.
+    """Return the task of moving from place to place [m], with a stand [s] after each move.
 
     Acceleration [m/s^2] and speed [m/s] are bounded.
     """

@@ -1,1 +1,1 @@
-"""Commands of this package, one module each, which pyproject.toml declares as entry points of friso."""
+"""Commands of this package, one module each, declared as entry points in pyproject.toml."""

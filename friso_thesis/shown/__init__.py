@@ -1,1 +1,1 @@
-"""Show results to people: words, figures, documents and pages by command, with their templates."""
+"""Show results to people: words, figures, documents and pages, with their templates."""

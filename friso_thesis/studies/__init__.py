@@ -1,1 +1,1 @@
-"""Compute the thesis's studies and claims, its guideline, and its own experiments of the rig."""
+"""Compute the thesis's studies, claims, guideline and own experiments of the rig."""

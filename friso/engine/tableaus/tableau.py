@@ -1,4 +1,6 @@
-"""Hold the coefficients of a Rosenbrock method, transformed so that it needs no matrix-vector product.
+"""Hold the coefficients of a Rosenbrock method, transformed to avoid matrix products.
+
+The products are those with the Jacobian.
 
 Hairer & Wanner, Solving ODEs II (1996), Sec. IV.7: stage i solves (1/(gamma h) - J) k_i = f(t + time_i h, x + sum_j
 a_ij k_j) + h rate_i df/dt + sum_j c_ij/h k_j. Stiffly accurate: the last stage adds k to the solution, and this k is

@@ -1,4 +1,4 @@
-"""Linear active disturbance rejection: an extended state observer, and the feedback of what it estimates.
+"""Linear active disturbance rejection: an extended state observer and its feedback.
 
 All that acts on the mass m besides the force F is one disturbance d: e'' = d - F/m for the error e. The observer has a
 triple pole at -w_o: with the correction c = e - e1, e1' = e2 + 3 w_o c, e2' = e3 - F/m + 3 w_o^2 c, e3' = w_o^3 c. The
@@ -63,7 +63,7 @@ def _parts(blocks: Any) -> _Parts:
 
 @register_controller
 class DisturbanceRejection(ControllerSection):
-    """Linear active disturbance rejection (ADRC) by the bandwidths of its feedback and of its observer."""
+    """Linear active disturbance rejection (ADRC) by the bandwidths of feedback and observer."""
 
     kind: Literal["adrc"]
     bandwidth: Annotated[Value, Quantity("Hz", positive, "8 Hz")]

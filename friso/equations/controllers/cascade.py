@@ -50,7 +50,10 @@ class CascadeTerms(NamedTuple):
 
 @register_controller
 class Cascade(ControllerSection):
-    """Position loop over velocity loop; an integral without a time, a filter and a feedforward of 0 are absent."""
+    """Position loop over velocity loop.
+
+    An integral without a time, a filter of 0 and a feedforward of 0 are absent.
+    """
 
     kind: Literal["cascade"]
     kv: Annotated[Value, Quantity("1/s", positive, "60 1/s")]

@@ -1,4 +1,4 @@
-"""PID by its gains (thesis, Eq. 6), with feedforward for acceleration, viscous and Coulomb friction."""
+"""PID by its gains (thesis, Eq. 6), with feedforward of acceleration and friction."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def proportional_derivative(stiffness: float, damping: float) -> dict[str, Any]:
 
 @register_controller
 class PidGains(Pid):
-    """PID by its gains (thesis, Eq. 6); a gain left out is 0. The filter acts on the derivative alone."""
+    """PID by its gains (thesis, Eq. 6); omitted gains are 0. The filter acts on the derivative."""
 
     kp: Annotated[Value, Quantity("N/m", non_negative, "3 N/m")] = Value(0, "0 N/m")
     ki: Annotated[Value, Quantity("N/(m*s)", non_negative, "4 N/(m*s)")] = Value(0, "0 N/(m*s)")

@@ -38,7 +38,10 @@ def _ways(flat: Mapping[str, Any]) -> int:
 
 @register_controller
 class TransferFunction(RationalController):
-    """Force over error as a transfer function in s, or with a sample_time in z, given in one of three ways; in SI."""
+    """Force over error as a transfer function in s, or with a sample_time in z; in SI.
+
+    It is given in one of three ways.
+    """
 
     kind: Literal["transfer_function"]
     numerator: Annotated[Values | None, Coefficients((2e3, 8e4, 4e5))] = None

@@ -1,4 +1,4 @@
-"""PID by van Dijk's tuning rules: crossover, alpha, beta and the mass it is tuned for (thesis, Eq. 7 and 8)."""
+"""PID by van Dijk's tuning rules: crossover, alpha, beta and mass (thesis, Eq. 7 and 8)."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class VanDijk(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the gains of Eq. 7 that follow from the keys, and the keys of every controller."""
+        """Return the gains of Eq. 7, which follow from the keys, and those of any controller."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
@@ -91,7 +91,7 @@ class VanDijk(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the low-pass followed by the three terms, or the three terms with a filtered derivative."""
+        """Draw the low-pass and the three terms, or three terms with a filtered derivative."""
         if cls.variant(flat):
             canvas.box("k_p (1 + tau_z/tau_i + 1/(tau_i s) + tau_z s/(1 + tau_p s))")
             return
@@ -110,7 +110,7 @@ class VanDijk(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: str | None) -> Mapping[str, Signal]:
-        """Return the three terms of the force [N]: those of Eq. 7, or those with the filter of Eq. 6."""
+        """Return the three terms of the force [N], by Eq. 7, or with the filter of Eq. 6."""
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         if variant:
             return {
@@ -127,7 +127,10 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return a [controller] table for a crossover such as "8 Hz", with the alpha and beta of the examples."""
+    """Return a [controller] table for a crossover such as "8 Hz", with the usual alpha and beta.
+
+    They are those of the examples.
+    """
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 
@@ -137,7 +140,7 @@ def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
 
 
 def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Return gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
+    """Return k_p [N/m] and the times tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
     from sympy import S
 
     from friso.equations.continuous import Continuous

@@ -1,4 +1,4 @@
-"""Define what friction laws have in common: their keys, and the steady friction level of Eq. 4."""
+"""Define the common parts of friction laws: keys, and the steady friction level of Eq. 4."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class Friction:
         return slid | modes | sides | stated
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
-        """Return the force [N] in steady motion at the velocity; None where the law does not determine it."""
+        """Return the steady force [N] at the velocity; None if the law does not determine it."""
         from friso.equations.cases import Piecewise
 
         try:

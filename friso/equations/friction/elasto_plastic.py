@@ -1,4 +1,4 @@
-"""Elasto-plastic friction: Dupont, Hayward, Armstrong, Altpeter 2002, doi:10.1109/TAC.2002.1000274."""
+"""Elasto-plastic friction: Dupont et al. 2002, doi:10.1109/TAC.2002.1000274."""
 
 from __future__ import annotations
 
@@ -88,7 +88,10 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of a law that is purely elastic up to its break-away deflection."""
+        """Return measured quantities of a law that is purely elastic up to break-away.
+
+        Break-away is given by a deflection.
+        """
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
         force = virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement)
@@ -96,7 +99,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with measured bristles and the break-away deflection that fits best."""
+        """Return keys with measured bristles; the break-away deflection fits the virgin curve best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
@@ -122,7 +125,7 @@ class ElastoPlastic(StribeckSection):
 
 
 def _most(measured: MeasuredFriction) -> float:
-    """Return the deflection [m] at which the bristles carry Coulomb friction in the weaker direction.
+    """Return the deflection [m] at which bristles carry the weaker direction's Coulomb friction.
 
     Larger break-away deflections are not possible.
     """

@@ -1,4 +1,4 @@
-"""Generalised Maxwell-slip friction: Al-Bender, Lampaert, Swevers 2005, doi:10.1109/TAC.2005.858676.
+"""Generalised Maxwell-slip friction: Al-Bender et al. 2005, doi:10.1109/TAC.2005.858676.
 
 The source's conditions are read as follows. An element sticks until its force *along the motion* reaches its share of
 the level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. After a reversal, an element that
@@ -110,7 +110,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return the choices that decide the equations: curve, number of elements, and their damping."""
+        """Return the choices that decide the equations: curve, number of elements, damping."""
         return Elements(
             StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
         )
@@ -207,7 +207,10 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Return the range of the attraction, which no virgin curve determines: a factor of ten up and down."""
+        """Return the range of the attraction: a factor of ten up and down.
+
+        No virgin curve determines it.
+        """
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}
 
@@ -250,7 +253,7 @@ POWERS = np.linspace(0.6, 4.0, 69)
 
 
 def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return stiffness [N/m] and slip deflection [m] of elements that approximate the virgin curve.
+    """Return stiffness [N/m] and slip deflection [m] of elements that follow the virgin curve.
 
     Both have the shape (at most `elements`,). A curve of few straight pieces is reproduced exactly. Otherwise the
     elements form the polygon of tangents with the least error.

@@ -1,4 +1,4 @@
-"""LuGre friction: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, doi:10.1109/9.376053 (thesis, Eq. 3 to 5)."""
+"""LuGre friction: Canudas de Wit et al. 1995, doi:10.1109/9.376053 (thesis, Eq. 3 to 5)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 
 @register_friction
 class LuGre(StribeckSection):
-    """Bristles that deflect by z: z' = v - sigma_0 abs(v)/g(v) z, F = sigma_0 z + sigma_1 z' + sigma_2 v."""
+    """Bristles that deflect by z.
+
+    z' = v - sigma_0 abs(v)/g(v) z, F = sigma_0 z + sigma_1 z' + sigma_2 v.
+    """
 
     model: Literal["lugre"]
     fitted: ClassVar[bool] = True
@@ -52,7 +55,7 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with the measured stiffness and damping; the virgin curve keeps the shape of LuGre."""
+        """Return keys with measured stiffness and damping; the virgin curve keeps LuGre's shape."""
         return keeping_bristle(measured)
 
     @staticmethod

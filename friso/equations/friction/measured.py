@@ -64,7 +64,7 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """Return the largest deviation from another virgin curve [N], as a fraction of static friction.
+        """Return the largest deviation from another virgin curve [N], over static friction.
 
         Both curves have the same displacements.
         """

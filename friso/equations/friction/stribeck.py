@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
 @register_friction
 class Stribeck(StribeckSection):
-    """A curve of force against velocity: F = g(v) tanh(v/v_r) + sigma_2 v; at rest it creeps instead of sticking."""
+    """A curve of force against velocity: F = g(v) tanh(v/v_r) + sigma_2 v.
+
+    At rest it creeps instead of sticking.
+    """
 
     model: Literal["stribeck"]
     fitted: ClassVar[bool] = True

@@ -9,7 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class MotionSettings(Settings):
-    """Limits on the numbers of moves and sinusoids, and the resolution of the search for reversals."""
+    """Limits on moves and sinusoids, and the resolution of the search for reversals."""
 
     most_moves: int = setting(100, "")
     """Most moves of a profile. Each has eight pieces or more, and its own settling time."""

@@ -94,7 +94,7 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of acceleration and acceleration time; the outward move ends before the return begins."""
+        """Return ranges of acceleration and its time; the outward move ends before the return."""
         least, most = shares
         acceleration, time = flat[ACCELERATION], flat[TIME]
         if not acceleration * time:

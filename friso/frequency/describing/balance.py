@@ -1,4 +1,4 @@
-"""Solve the single-harmonic balance: the textbook's test for a limit cycle, but no test for hunting.
+"""Solve the single-harmonic balance: a test for a limit cycle, but none for hunting.
 
 The friction is replaced by its describing function N(A, omega). The loop then has a periodic motion where 1/R(i omega)
 = N(A, omega), with R the receptance of the loop for a friction force (`loop`). So -1/R + N = 0 is one complex equation

@@ -91,7 +91,7 @@ class DrivenPlant:
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
-        """Return amplitudes moved until their forces lie below (side -1) or above (side 1) given forces."""
+        """Return amplitudes moved until their forces lie below (side -1) or above (1) given ones."""
         settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
@@ -142,7 +142,7 @@ class Roots:
 
 
 def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
-    """Return all amplitudes at which forces [N] move the cart, within the resolution of the grid."""
+    """Return all amplitudes at which forces [N] move the cart, as far as the grid resolves."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])
@@ -159,7 +159,7 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 
 
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Return zeros of many functions between ends with values of opposite sign, and the remaining values.
+    """Return zeros of many functions between ends of opposite sign, and the remaining values.
 
     The method takes the secant of the bracket, and halves the value at an end that stays (Illinois).
     """

@@ -1,4 +1,4 @@
-"""Compute the describing function of a friction law: its response to a sinusoidal motion, by harmonics.
+"""Compute a friction law's describing function: its response to a sinusoidal motion.
 
 The method is that of Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, McGraw-Hill
 1968. The law is the stage's own (LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053). LuGre has a memory, so its
@@ -60,7 +60,7 @@ def describing(
     samples: int = SAMPLES,
     rtol: float = RTOL,
 ) -> xr.Dataset:
-    """Describing function of the stage's friction, for every amplitude [m] with every frequency [Hz] of its motion.
+    """Describing function of the stage's friction, over amplitude [m] and frequency [Hz].
 
     Variables over ("amplitude", "frequency"): `stiffness`, N = F_1/A [N/m], complex; `work` [J], what friction takes
     out of the motion in a period; `gap`, by how much the law's own states miss themselves after a period, as a share
@@ -157,7 +157,10 @@ def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int
 
 
 def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: int) -> np.ndarray:
-    """Return harmonics of the force [N] from states (runs, samples, states) sampled over a part of the period."""
+    """Return harmonics of the force [N] from states (runs, samples, states).
+
+    The states are sampled over a part of the period.
+    """
     within = round(samples * share)
     force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T
     period = force if share == 1.0 else np.hstack([force, -force])

@@ -1,4 +1,7 @@
-"""Compute the closed loop as friction sees it: positions of cart and stage per friction force on the cart."""
+"""Compute the closed loop as friction sees it: positions per friction force on the cart.
+
+The positions are those of cart and stage.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compute the mass line of a plant with friction, measured at several places of the rail (thesis, Fig. 17)."""
+"""Compute the mass line of a plant with friction at several places (thesis, Fig. 17)."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def mass_line(
     frequencies: Sequence[float] | np.ndarray,
     rtol: float = RTOL,
 ) -> xr.Dataset:
-    """Return how far the measured plant lies off the line 1/(m omega^2) of its whole mass, place by place.
+    """Return how far the measured plant lies off the line 1/(m omega^2), place by place.
 
-    `places` lists what differs there, as keys of the stage file with their values, such as {"friction.static": "2 N"};
-    `forces` [N] and `frequencies` [Hz] are those of the measurement, `rtol` the tolerance of its friction.
-    Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser that steps upwards (see
-    `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value; `phase` [rad], that of
-    the response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force", "frequency") are
-    standard deviations over the places. Raises InputError for places that no stage may have, and as
+    The mass m is the whole mass of the plant. `places` lists what differs there, as keys of the stage file with their
+    values, such as {"friction.static": "2 N"}; `forces` [N] and `frequencies` [Hz] are those of the measurement, `rtol`
+    the tolerance of its friction. Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser
+    that steps upwards (see `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value;
+    `phase` [rad], that of the response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force",
+    "frequency") are standard deviations over the places. Raises InputError for places that no stage may have, and as
     `plant_response`.
 
     Examples

@@ -86,7 +86,7 @@ class Basis:
         return cls(orders, -1.0 if mirrored else 1.0, waves, slopes, share)
 
     def harmonics(self, signal: np.ndarray) -> np.ndarray:
-        """Return complex harmonics (orders, columns) of signals at the middles of intervals (M, columns)."""
+        """Return complex harmonics (orders, columns) of signals at mid-intervals (M, columns)."""
         weights = np.where(self.orders == 0, 1.0, 2.0)[:, None] / len(self.waves)
         real, imaginary = np.split(self.waves.T @ signal, 2)
         return weights * (real + 1j * imaginary)
@@ -126,7 +126,7 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return the status of a series that should lie near a motion with the amplitude `length` [m]."""
+    """Return the status of a series near a motion with the amplitude `length` [m]."""
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST

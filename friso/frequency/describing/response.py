@@ -1,4 +1,4 @@
-"""Compute the frequency response of a plant with friction, as a drive's analyser measures it.
+"""Compute the frequency response of a plant with friction, as a drive measures it.
 
 It depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force (Gelb,
 Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls with the
@@ -35,7 +35,7 @@ def plant_response(
     frequencies: Sequence[float] | np.ndarray,
     rtol: float = RTOL,
 ) -> xr.Dataset:
-    """First-harmonic response of the plant to sinusoidal actuator forces of the amplitudes `forces` [N].
+    """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 
     Variables over ("force", "frequency", "branch"), by rising amplitude, NaN where there are fewer: `response`, stage
     position over force [m/N], complex; `cart_response` [m/N]; `amplitude` of the cart [m]; `stiffness` of friction

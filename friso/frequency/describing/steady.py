@@ -73,7 +73,7 @@ class Imposition:
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
-        """Return the friction force and the rates of the law's own states, from states (states, count)."""
+        """Return friction force and rates of the law's own states, from states (states, count)."""
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         rates = module.right_hand_side(states, modes, 0.0, at_rest, self.values)
@@ -92,7 +92,10 @@ class Imposition:
         return Imposition(flat, len(numbers), self.rtol)
 
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
-        """Follow a part of a period from the law's own states (count, inner), with `samples` per period."""
+        """Follow a part of a period from the law's own states (count, inner).
+
+        There are `samples` per period.
+        """
         settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
         starts[:, self.kernel.position] = self.flat["motion.displacement"]

@@ -1,9 +1,9 @@
-"""Compute the friction force on any periodic motion, and its derivative, for multi-harmonic balance.
+"""Compute the friction force on any periodic motion, and its derivative.
 
-The derivative is by the motion. The law's own state obeys a differential equation under a velocity given at the middles
-of M equal intervals. The implicit midpoint rule makes it a chain that ends where it began. Over half a period of a
-symmetric motion it ends at the mirror image. The force at the middles follows. The rule is of second order, and a fast
-state settles on its steady value however long the intervals are.
+Both are used for multi-harmonic balance. The derivative is by the motion. The law's own state obeys a differential
+equation under a velocity given at the middles of M equal intervals. The implicit midpoint rule makes it a chain that
+ends where it began. Over half a period of a symmetric motion it ends at the mirror image. The force at the middles
+follows. The rule is of second order, and a fast state settles on its steady value however long the intervals are.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class FrictionAnswer:
     pushed: np.ndarray
 
     def along(self, velocities: np.ndarray) -> np.ndarray:
-        """Return changes of the force [N] for changes of the velocities [m/s], both of shape (M, columns)."""
+        """Return changes of the force [N] for velocity changes [m/s], both (M, columns)."""
         direct = self.by_velocity[:, None] * velocities
         if self.chain is None:
             return direct
@@ -124,7 +124,7 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with velocities [m/s] (M,) at the middles of intervals [s].
+    """Return the friction on a motion with velocities [m/s] (M,) at mid-intervals [s].
 
     After the intervals the motion is back at its start (sign 1), or at the mirror image of its start (-1).
     """

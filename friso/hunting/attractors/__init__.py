@@ -71,7 +71,7 @@ class Attractors:
 
     @property
     def target(self) -> Target:
-        """Return the motion that marks a run as hunting, shape (count,); NaN for a stage without attractor."""
+        """Return the motion that marks a run as hunting, shape (count,); NaN for stages without one."""
         settings = SurveySettings.current()
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         observed = np.zeros(len(self.decided), bool)

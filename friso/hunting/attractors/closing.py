@@ -76,7 +76,7 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """Return a state of each run, (runs, states), in which it sticks within the next `times` [s].
+    """Return a state of each run, (runs, states), in which it sticks within `times` [s].
 
     At this instant the integrator balances the constant forces on a stage at rest. If there are several such instants,
     the one after the longest standstill is taken. `times` has the shape (runs,).

@@ -67,7 +67,10 @@ class Ends(ArrayRows):
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
-    """Estimate the period of a hunting cycle [s], shape (count,), from the sticking time and the loop's frequency."""
+    """Estimate the period of a hunting cycle [s], (count,).
+
+    The estimate is based on the sticking time and the loop's frequency.
+    """
     settings = SurveySettings.current()
     return 2 * (wait(stages, settings.typical_distance * stages.length) + 2 * np.pi / stages.number("rate"))
 
@@ -121,7 +124,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
-    """Return which runs have moved so little for so long that they cannot break away again, (runs,)."""
+    """Return which runs have stood still so long that they cannot break away again, (runs,)."""
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))

@@ -9,7 +9,7 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class SurveySettings(Settings):
-    """Settings of the survey, which follows runs from many starts, in rounds, to their attractors."""
+    """Settings of the survey, which follows runs from many starts to their attractors."""
 
     arrival_periods: tuple[float, float] = setting((60.0, 600.0), "periods")
     """Shortest and longest time until a motion counts as arrived. If shorter, slow transients pass for attracted; if

@@ -1,4 +1,4 @@
-"""Choose the states from which a survey starts, so that runs reach every attractor of a stage."""
+"""Choose the states from which a survey starts, so that runs reach every attractor."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ class Starts:
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Prepare runs for their first round: set its length, and mark stages with mirror-image motions."""
+        """Set the length of the first round of runs, and mark stages with mirror-image motions."""
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

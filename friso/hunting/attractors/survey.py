@@ -55,7 +55,7 @@ class Swinging:
 
     @property
     def time_constant(self) -> float:
-        """Return the time [s] in which a deviation from the motion shrinks by the factor e; NaN if unknown."""
+        """Return the time [s] in which a deviation from the motion shrinks by e; NaN if unknown."""
         if self.cycles is not None:
             return float(self.cycles.time_constant[self.number])
         return -self.time / float(np.log(self.slope)) if 0 < self.slope < 1 else float("nan")
@@ -98,7 +98,7 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Return which runs of the stages `owners` repeat like one of the given kinds of motion, (runs,)."""
+    """Return which runs of the stages `owners` repeat like one of the given motions, (runs,)."""
     settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
@@ -245,9 +245,10 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """Close orbits from runs that are ready; return the numbers of the runs that still swing without an attractor.
+        """Close orbits from runs that are ready, and return the runs that still swing.
 
-        `early` restricts closing to runs that repeat well and resemble no unstable cycle.
+        The result has the numbers of runs that still swing without an attractor. `early` restricts closing to runs that
+        repeat well and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
@@ -297,7 +298,7 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an unstable cycle, or a cycle that could not be closed as stable."""
+        """Return which runs resemble an unstable cycle, or one that could not be closed as stable."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -387,7 +388,7 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs beside an unstable cycle repeat so exactly that they must lie on another cycle."""
+        """Return which runs beside an unstable cycle repeat so well that they lie on another cycle."""
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)

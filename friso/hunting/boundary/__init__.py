@@ -1,4 +1,4 @@
-"""Follow hunting cycles through one key or two to the boundary of hunting, where they lose stability."""
+"""Follow hunting cycles through one key or two to where they lose stability."""
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point
 from friso.hunting.boundary.curve import CLOSED, Curve, Spot

@@ -125,7 +125,7 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle as `solve` does, with the Jacobian of the nearby cycle alone, if it has one."""
+        """Find the cycle as `solve` does, with the Jacobian of the nearby cycle if it has one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -192,7 +192,7 @@ class Tracer:
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """Return the cycle at the end of the range as a list of one, or an empty list if none was found.
+        """Return the cycle at the end of the range as a list of one; an empty list if none is found.
 
         It lies between the last point inside the range and the first beyond.
         """

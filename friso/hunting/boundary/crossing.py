@@ -1,4 +1,4 @@
-"""Locate where scattered values pass zero or turn, with an error bound, by a cubic through them."""
+"""Locate where scattered values pass zero or turn, by a cubic with an error bound."""
 
 from __future__ import annotations
 

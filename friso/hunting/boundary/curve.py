@@ -80,7 +80,7 @@ class Expected:
 
     @classmethod
     def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
-        """Extrapolate a curve one step, by a parabola through its last three points, or a line through two."""
+        """Extrapolate a curve one step, by a parabola through three points, or a line through two."""
         last = spots[-3:]
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
@@ -99,7 +99,7 @@ class CurveTracer:
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, expected: Expected | None = None
     ) -> Spot | None:
-        """Find the point of the curve on a line through the box, at most `reach` from the line's `origin`.
+        """Find the point of the curve on a line, at most `reach` from the line's `origin`.
 
         The search starts from the point `near` it, or from the `expected` one. Returns None if it fails.
         """
@@ -134,7 +134,7 @@ class CurveTracer:
         return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
-        """Follow the whole curve through a point; return None if no second point is found next to the first."""
+        """Follow the whole curve through a point; None if no second point is found next to it."""
         settings = ContinuationSettings.current()
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (settings.second_point_distance, -settings.second_point_distance):
@@ -178,7 +178,7 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """Find the point at which the curve leaves the box; return a list of one point, or an empty list."""
+        """Find where the curve leaves the box; return a list of one point, or an empty list."""
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(

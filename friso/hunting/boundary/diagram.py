@@ -1,4 +1,4 @@
-"""Compute the bifurcation diagram in one key: all branches of cycles, and where they lose stability."""
+"""Compute the bifurcation diagram in one key: branches of cycles and their stability."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ class Diagram:
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
     def in_doubt(self, places: np.ndarray) -> np.ndarray:
-        """Return which places, (n,), lie within the error of a special point, where stability is unknown."""
+        """Return which places, (n,), lie within the error of a special point.
+
+        Stability is unknown there.
+        """
         return _in_doubt(self.special, places)
 
 
@@ -76,7 +79,10 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
-        """Follow the branch through a cycle unless an earlier branch passes it; return whether it was followed."""
+        """Follow the branch through a cycle, and return whether it was followed.
+
+        A branch that passes a cycle of an earlier branch is not followed.
+        """
         start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
         if any(_passes(branch, start) for branch in branches):
             return False

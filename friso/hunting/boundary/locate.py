@@ -39,7 +39,7 @@ class LocatedPoint:
     slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
-        """Tell whether a point of the branch is so near this special point that its stability is unknown.
+        """Tell whether stability is unknown at a point of the branch near this special point.
 
         It is if it lies within the error of the special point.
         """
@@ -70,7 +70,7 @@ def _complex(point: Point) -> bool:
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """Locate the special point between two neighbours on a branch, with its error; None if not reached."""
+    """Locate the special point between two neighbours on a branch; None if not reached."""
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -193,7 +193,7 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
 
 
 def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
-    """Locate a fold by a curve through the places of orbits near a first guess, along a direction.
+    """Locate a fold by a curve through orbits near a first guess, along a direction.
 
     Where a limiter chatters, each multiplier is an average over a range of distances, and passes 1 beside the fold. The
     error bound is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
@@ -226,10 +226,11 @@ def corrected(
     states: np.ndarray,
     slope: float = np.nan,
 ) -> LocatedPoint | None:
-    """Find the special point along a direction from an origin, at most `reach` away, by the secant method.
+    """Find the special point along a direction from an origin by the secant method.
 
-    The space is place, log distance and log time. The search starts from a nearby cycle, its approximate `states` (1,
-    states), and the `slope` of the multiplier if known. Returns None if there is no such point.
+    It lies at most `reach` away. The space is place, log distance and log time. The search starts from a nearby cycle,
+    its approximate `states` (1, states), and the `slope` of the multiplier if known. Returns None if there is no such
+    point.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
@@ -258,7 +259,7 @@ def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
 
 
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
-    """Tell whether an apparent fold of an asymmetric branch is in fact where it meets the symmetric one."""
+    """Tell whether an apparent fold of an asymmetric branch meets the symmetric branch there."""
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
     stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))

@@ -65,7 +65,7 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
-    """Return the points of a curve, (n, 2), with their cycles; a closed ring repeats its first point."""
+    """Return the points of a curve, (n, 2), with their cycles; a ring repeats its first point."""
     again = CLOSED in curve.ends
     spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
     return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots

@@ -150,7 +150,7 @@ def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of neighbours on the grid, the first inside the region and the second outside."""
+    """Return pairs of grid neighbours, the first inside the region and the second outside."""
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -170,7 +170,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 
 
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
-    """Follow a cycle from a stage towards a neighbour, to the point where it loses stability or folds.
+    """Follow a cycle towards a neighbouring stage, to where it loses stability or folds.
 
     Returns that point, or None, and whether the cycle reaches the neighbour unchanged.
     """

@@ -120,7 +120,7 @@ class Space:
         """
 
         def length(place: float) -> float:
-            """Return the distance along the line from `place` over which the fastest key changes by one per cent."""
+            """Return the distance from `place` along the line that changes the fastest key by 1 %."""
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)
             return min(swept.hundredth(float(at)) / abs(float(way)) for swept, at, way in steps if way)
 

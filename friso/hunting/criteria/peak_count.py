@@ -74,7 +74,7 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """Count the samples of each row up to the end of the last fall by `DISTINCT`; 0 if nothing falls."""
+    """Count each row's samples up to the end of its last fall by `DISTINCT`; 0 for no fall."""
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
     falls = values - ahead >= DISTINCT
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

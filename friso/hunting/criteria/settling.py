@@ -1,4 +1,4 @@
-"""Define the settling time for `friso check`, `compare`, `simulate`, `sweep`, `map` and `tune`.
+"""Define the settling time for friso check, compare, simulate, sweep, map and tune.
 
 The time runs from the last corner of the reference until the deviation stays within a band while the reference stands
 there. For a motion that stands at several places it is the longest of these times. It is infinite if the deviation is
@@ -30,7 +30,7 @@ def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.
 
 
 def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """Return the settling times [s] of runs at the last place where the reference stands, (runs,).
+    """Return the settling times [s] of runs at the reference's last place, (runs,).
 
     The verdict on a stage needs no other place (see `settling_of_runs`).
     """
@@ -38,7 +38,7 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Return two settling times [s] of runs: at the places that the reference leaves, and at its last.
+    """Return settling times [s] of runs at the places the reference leaves, and at its last.
 
     The first is the longest over all places that the reference leaves.
     """

@@ -1,4 +1,4 @@
-"""The verdict on a stage: by the cycles that attract, and by where its own motion ends; by nothing else.
+"""The verdict on a stage: by the cycles that attract, and by where its own motion ends.
 
 | verdict | a cycle attracts | the stage's own motion |
 |---|---|---|

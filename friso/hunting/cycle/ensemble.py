@@ -1,4 +1,4 @@
-"""Represent stages that share their equations, with the reference held at zero and any initial state."""
+"""Represent stages of equal equations, with the reference at zero and any initial state."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class Ensemble:
         return self.kernel.having(Role.INTEGRAL)[:-1]
 
     def settled(self, steady: Steady) -> np.ndarray:
-        """Return the states in a steady motion that has lasted long enough for transients to decay, (count, states)."""
+        """Return the states in a steady motion after all transients, (count, states)."""
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:

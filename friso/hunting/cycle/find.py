@@ -1,4 +1,4 @@
-"""Find limit cycles of many stages at once, close them as orbits, and compute their stability."""
+"""Find limit cycles of many stages at once, as closed orbits with their stability."""
 
 from __future__ import annotations
 

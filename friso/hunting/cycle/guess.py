@@ -29,9 +29,10 @@ class Guess:
 
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
-    """Guess the symmetric cycle: the largest distance from which a stage lands equally far on the other side.
+    """Guess the symmetric cycle from the return map.
 
-    There the return map falls through its diagonal.
+    It is the largest distance from which a stage lands equally far on the other side. There the return map falls
+    through its diagonal.
     """
     settings = OrbitSettings.current()
     low, high = _falling(positive.distances, positive.returns - positive.distances)
@@ -49,7 +50,7 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 
 
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
-    """Guess the cycle over a whole period: a distance to which a stage returns after two landings.
+    """Guess the cycle over a whole period: a distance that recurs after two landings.
 
     The distance on the other side differs by a fraction of at least `apart`. Of several guesses, the one with the
     smallest difference is taken if `apart` is 0, else the one with the largest. `positive` and `negative` are the maps
@@ -73,7 +74,7 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """Return the distance, among those numbered `goes`, from which a stage returns to the same distance.
+    """Return the distance, among those numbered `goes`, that recurs after two landings.
 
     If there is none, the distance that almost returns is taken: near a fold both fixed points lie between two points of
     the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
@@ -112,7 +113,10 @@ def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
-    """Return the distance at which a function falls through zero, by linear interpolation between two distances."""
+    """Return the distance at which a function falls through zero.
+
+    It is interpolated linearly between two distances.
+    """
     low, high = _falling(distances, rise)
     above, below = _interpolated(low, distances, rise), _interpolated(high, distances, rise)
     return low + (high - low) * above / (above - below)

@@ -1,4 +1,4 @@
-"""Find lasting motions near an unstable cycle, of any number of swings, from the return map around it."""
+"""Find lasting motions near an unstable cycle from the return map around it."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the deviations that motions still have after many returns within the range of a map.
+    """Return the deviations that motions have after many returns within a map's range.
 
     The map takes the deviations `before` a return to those `after` it, each of shape (runs,). The result ascends. A
     motion that grew at every return is left out: near a multiplier of 1 or -1 it merely leaves slowly.

@@ -1,4 +1,4 @@
-"""Find the limit cycles of one stage with size, period and stability, or the reason why there are none."""
+"""Find the limit cycles of one stage, or the reason why there are none."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class Hunting:
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Return why a stage cannot hunt whatever its numbers, or why it is not searched; "" if it may hunt.
+    """Return why a stage cannot hunt, or why it is not searched; "" if it may hunt.
 
     With dither (`DITHERS`) no cycle is searched for.
     """
@@ -282,7 +282,7 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
 
 
 def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
-    """Return why something may attract stages in which the survey found no attractor, as texts (count,).
+    """Return why stages may have an attractor that the survey missed, as texts (count,).
 
     A text is "" without a reason. `farther`, (count,), marks stages that may keep swinging from larger distances than
     were tried.

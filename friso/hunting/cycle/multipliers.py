@@ -1,4 +1,4 @@
-"""Compute the growth of deviations from a cycle per return, for small and for finite deviations.
+"""Compute how deviations from a cycle grow per return.
 
 Floquet multipliers describe small deviations, the slope of the return map finite ones.
 """
@@ -72,9 +72,9 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
 
 def _straight(pairs: np.ndarray) -> float:
-    """Fit a straight line without outliers to pairs (points, 2); return its slope, NaN with too few pairs.
+    """Fit a straight line without outliers to pairs (points, 2), and return its slope.
 
-    A stage that does not break away makes an outlier.
+    The slope is NaN with too few pairs. A stage that does not break away makes an outlier.
     """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:

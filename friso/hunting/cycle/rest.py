@@ -38,17 +38,20 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
-    """Return states of stages at their reference with all masses moving at a velocity [m/s], everything else zero."""
+    """Return states of stages at their reference that move at a velocity [m/s].
+
+    All masses move alike, and everything else is zero.
+    """
     states = np.zeros((stages.count, len(stages.kernel.states)))
     states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which the integrator of a sticking stage winds up to break-away, (count,).
+    """Return the time [s] in which the integrator winds up to break-away, (count,).
 
-    If the integrator pauses, it is a time in which the loop moves. It is at most the time that an integrator with a
-    leak takes.
+    The stage sticks meanwhile. If the integrator pauses, it is a time in which the loop moves. It is at most the time
+    that an integrator with a leak takes.
     """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)

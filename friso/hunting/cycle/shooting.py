@@ -1,4 +1,7 @@
-"""Close periodic orbits by Newton's method on the flow over a period, or over half a period and the mirror image."""
+"""Close periodic orbits by Newton's method on the flow.
+
+The flow runs over a period, or over half a period and the mirror image.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ class Orbits(ArrayRows):
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Integrate orbits from states (count, states) for times [s] (count,), with their derivatives.
+    """Integrate orbits from states (count, states) for times [s] (count,), with derivatives.
 
     One deviation runs along each state but the one with the largest rate: that derivative follows from the others,
     because the flow carries the rates at the start to those at the end. With modes that remember, a state alone does
@@ -138,11 +141,12 @@ def close_along(
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
 ) -> Followed:
-    """Close orbits as `close` does, while stages move along lines until each orbit lies on its border.
+    """Close orbits as `close` does, while stages move until each orbit lies on its border.
 
-    The orbits start from states and times [s]. The method passes folds, where no orbit exists at a place beyond. With
-    `jacobians` of closed orbits at or near the start, the first step to the border needs no run. The Jacobians may
-    belong to another line through the keys: further steps learn the derivative along this line.
+    The stages move along lines in the keys. The orbits start from states and times [s]. The method passes folds, where
+    no orbit exists at a place beyond. With `jacobians` of closed orbits at or near the start, the first step to the
+    border needs no run. The Jacobians may belong to another line through the keys: further steps learn the derivative
+    along this line.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
@@ -156,7 +160,7 @@ _S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
-    """Newton's method on several orbits at once; an orbit that is closed or has failed is left alone."""
+    """Newton's method on several orbits at once; closed and failed orbits are left alone."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Find the swings of many runs at once: the extrema of the zigzag of each stage about its reference."""
+"""Find the swings of many runs at once, from the turning points about the reference."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """First swings of runs, (runs, swings): turning points [m] and times [s], NaN after the last one."""
+    """First swings of runs, (runs, swings): turning points [m] and times [s], then NaN."""
 
     values: np.ndarray
     times: np.ndarray
@@ -36,7 +36,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
 
 def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where [m] and when [s] runs turned last, (runs, most), the last swing in the last column.
+    """Return where [m] and when [s] runs turned last, (runs, most), the last swing last.
 
     Columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a run
     ends does not count.
@@ -55,7 +55,7 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 
 
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
-    """Find the turning points of zigzags column by column; `side` is the side on which they start."""
+    """Find the turning points of zigzags column by column, which start on the side `side`."""
     runs = len(values)
     rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))

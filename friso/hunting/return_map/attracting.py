@@ -41,7 +41,10 @@ class MapSurvey:
 
     @property
     def doubts(self) -> np.ndarray:
-        """Return why the map of a stage does not decide which motions are stable, words (count,); "" if it decides."""
+        """Return why a stage's map does not decide which motions are stable, words (count,).
+
+        The word is "" if the map decides.
+        """
         settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
         for stage, landing_map in enumerate(self.mapped.maps):
@@ -189,9 +192,9 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 
 
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
-    """Return after how many swings, at least `least`, a run's last landings repeat; 0 if they do not.
+    """Return after how many swings a run's last landings repeat; 0 if they do not.
 
-    `path` has the shape (landings,).
+    There are at least `least` swings. `path` has the shape (landings,).
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

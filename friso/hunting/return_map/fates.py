@@ -23,7 +23,7 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 def motions_go_on(
     flat: Mapping[str, Any], count: int, landing_map: LandingMap, starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which motions of one stage swing for ever, and for which this is known, both (count,).
+    """Return which motions of one stage swing for ever, and which are known, both (count,).
 
     The stage is given as flat keys to SI numbers or arrays (count,). Motions are given by these keys, or by initial
     states at rest at the reference, `starts` (count, states). The result is unknown if the reference does not come back

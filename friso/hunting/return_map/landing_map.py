@@ -1,4 +1,4 @@
-"""Interpolate the return map of a stage, from one landing to the next, and iterate it to attractors."""
+"""Interpolate a stage's return map from landing to landing, and iterate it to attractors."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """Return the attractors of the map in which a stage swings for ever, by iteration from all points."""
+        """Return the map's attractors in which a stage swings for ever, from all points."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))
@@ -187,11 +187,11 @@ class LandingMap:
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
-        """Predict the signed distances of the next landings, (count,); 0 for a stage that comes to rest."""
+        """Predict the signed distances of the next landings, (count,); 0 for coming to rest."""
         return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
-        """Return which landings, given by signed distances, lead to swinging for ever, shape (count,)."""
+        """Return which landings, as signed distances, lead to swinging for ever, (count,)."""
         return np.all(self._followed(self._places(distances)) > REST, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
@@ -229,7 +229,7 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """Return the largest relative error of a landing predicted by its neighbours, and its distance.
+        """Return the largest relative error of a landing predicted by neighbours, and its distance.
 
         The error is infinite if a stage rests between two landings that continue alike, or the reverse. It is 0 if no
         three points are close together. Only points whose next landing is at more than half of their distance count.
@@ -284,7 +284,7 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return how closely paths repeat, (points,): the least difference from places one cycle earlier.
+    """Return how closely paths repeat, (points,): least difference to one cycle earlier.
 
     Paths have the shape (points, landings).
     """

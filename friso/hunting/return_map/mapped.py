@@ -114,7 +114,7 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Return starts of more runs of a stage, whose landings should fall into gaps between points."""
+        """Return starts of more runs, whose landings should fill gaps between points."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -179,7 +179,7 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """Return the landings of runs of the stages `owners` that stick at first at `starts`, both (runs,)."""
+    """Return the landings of runs of the stages `owners` that stick at `starts`, both (runs,)."""
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
 
@@ -246,7 +246,7 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts at breaks of the map, where only one of two neighbours lands, or their landings differ.
+    """Return starts at breaks of the map, where neighbours land differently or not at all.
 
     An attractor may reach up to such a break. Starts ascend. `landings`, (runs,), are the first landings.
     """

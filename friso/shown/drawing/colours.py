@@ -52,7 +52,7 @@ class ColourScale:
 
 
 def painted(field: Coloured) -> Array:
-    """Return the numbers as drawn: z, or its logarithm, with values below the lower limit raised to it."""
+    """Return the numbers as drawn: z, or its logarithm, raised to the lower limit."""
     if not field.log:
         return field.z
     low, _ = _limits(field)
@@ -77,7 +77,7 @@ def scale(field: Coloured) -> ColourScale:
 
 
 def ramp(count: int) -> tuple[str, ...]:
-    """Return `count` colours evenly spaced along viridis, without its darkest and lightest parts."""
+    """Return `count` colours evenly along viridis, without its darkest and lightest parts."""
     table = np.array([[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in VIRIDIS])
     places = np.linspace(0.5, len(VIRIDIS) - 1.2, count)
     mixed = [np.interp(places, np.arange(len(VIRIDIS)), table[:, i]).round().astype(int) for i in range(3)]

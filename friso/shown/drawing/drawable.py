@@ -25,7 +25,10 @@ LONGEST_TEXT = 1000
 
 
 def drawable(figure: Figure) -> Figure:
-    """Return a figure with prefixed units, thinned series, limits as series, and drawable markers."""
+    """Return a figure ready to draw: prefixed units, thinned series, limits, and markers.
+
+    Limits are drawn as series.
+    """
     return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
 
 
@@ -68,7 +71,7 @@ def colour_prefix(field: Coloured) -> tuple[float, str]:
 
 
 def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
-    """Return the categories and markers of all panels with maps or clouds, for one common legend.
+    """Return the categories and markers of all panels with maps or clouds, for one legend.
 
     Only categories that occur are included, each once.
     """
@@ -131,7 +134,7 @@ def _panel(panel: Panel) -> Panel:
 
 
 def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
-    """Return the values that decide on the prefix of an axis: its limits, or else all finite data."""
+    """Return the values that decide an axis's prefix: its limits, or else all finite data."""
     if axis.limits is not None:
         return np.array(axis.limits)
     values = _finite(np.concatenate([np.empty(0), *(np.asarray(array, dtype=float) for array in arrays)]))

@@ -26,7 +26,7 @@ INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data).
+    """One axis: label from `quantity` and `unit`, and `limits` [unit] (None: from the data).
 
     An axis of words has the positions 0, 1, 2, ..., named by `words`, and no unit. Ticks stand at multiples of `step`
     [unit], if that is given: angles are read in quarters of a turn. The unit has no prefix unless it is `prefixed`.
@@ -68,7 +68,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Markers:
-    """Single points x, y, both of shape (n,), never thinned (counted peaks, an evaluation point)."""
+    """Single points x, y, both (n,), never thinned, such as counted peaks."""
 
     x: Array
     y: Array
@@ -198,7 +198,7 @@ class Cloud(Coloured):
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes with what is drawn in it: maps and clouds lowest, then bands, limits, lines and markers.
+    """One pair of axes with maps and clouds lowest, then bands, limits, lines and markers.
 
     With `equal`, a unit is as long on the one axis as on the other, and both have limits.
     """
@@ -222,7 +222,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage.
+    """Panels in `columns` columns, row by row; `name` for its file, `subject` for its stage.
 
     The caption stands next to the figure on a page; the note is part of the figure itself.
     """

@@ -1,4 +1,4 @@
-"""Draw maps and clouds on paper: cells, colour bars, and the legend and note beneath a figure."""
+"""Draw maps and clouds on paper: cells, colour bars, legend and note."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def add_footer(
 
 
 def _key_rows(figure: Figure, width: float) -> int:
-    """Return how many rows the legend takes, with columns as wide as the longest text and its patch."""
+    """Return the number of rows of the legend, in columns as wide as the longest entry."""
     labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0

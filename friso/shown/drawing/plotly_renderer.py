@@ -76,7 +76,7 @@ def fragment(figure: Figure) -> str:
 
 
 def parts_of_both(figure: Figure) -> dict[str, Any]:
-    """Return `parts`, with what is different on a narrow screen: layout, and places of colour bars."""
+    """Return `parts`, with the layout and colour bars that differ on a narrow screen."""
     prepared = drawable(figure)
     return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
 
@@ -186,10 +186,10 @@ class _Head:
 
     @classmethod
     def of(cls, panel: Panel, width: int, panels: int) -> _Head:
-        """Break title and legend of a panel into lines and rows, where `panels` panels share a width [px].
+        """Break a panel's title and legend into lines and rows.
 
-        Entries stand in columns as wide as the longest. Plotly breaks a row at the width of the whole figure. Beside
-        other panels, entries that need several rows are therefore stacked.
+        `panels` panels share a width [px]. Entries stand in columns as wide as the longest. Plotly breaks a row at the
+        width of the whole figure. Beside other panels, entries that need several rows are therefore stacked.
         """
         labels, own = _labels(panel), width // panels
         rows = key_rows(labels, own)

@@ -1,4 +1,4 @@
-"""Measure machines: swinging, settling, standstill, force, and the margin of the linear loop."""
+"""Measure machines: swinging, settling, standstill, force, and the loop's margin."""
 
 from __future__ import annotations
 

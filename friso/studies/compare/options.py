@@ -245,7 +245,7 @@ def _with_setting(setting: Setting, situation: Situation) -> Variant:
 
 
 def _rejecting(situation: Situation) -> Variant:
-    """Return the locked stage with active disturbance rejection, as fast as the present controller."""
+    """Return the locked stage with disturbance rejection, as fast as the present controller."""
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
     try:

@@ -80,7 +80,7 @@ class OptionResult:
 
     @property
     def settled(self) -> Share:
-        """Return the probability that a machine is in position by the end of the run, and stays there."""
+        """Return the probability that a machine is in position, and stays there, at the end."""
         return share(self.measures.rests, self.measures.done)
 
     @property

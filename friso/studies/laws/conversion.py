@@ -1,4 +1,4 @@
-"""Convert one friction law to another that fits the same measurements, and report what is lost."""
+"""Convert a friction law to another that fits the same measurements; report the losses."""
 
 from __future__ import annotations
 
@@ -233,7 +233,10 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """Return the virgin curve before and after, where it differs most from the curve or the points."""
+    """Return the virgin curve before and after, where it differs most.
+
+    It is compared with the curve or the points.
+    """
     settings = StudySettings.current()
     if not after.stiffness:
         return MeasuredChange(

@@ -1,4 +1,4 @@
-"""Compute hysteresis loops of friction laws: force over a slow motion to and fro, before sliding."""
+"""Compute hysteresis loops of friction laws over a slow motion to and fro, before sliding."""
 
 from __future__ import annotations
 

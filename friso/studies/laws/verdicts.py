@@ -275,9 +275,10 @@ def _together(values: Sequence[Any]) -> Any:
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """Return the values [SI] to try for keys that the measurements leave open, by name of the trial.
+    """Return the values [SI] to try for keys left open, by name of the trial.
 
-    "" is as converted; "least" and "most" are at the ends of the range of a key. The stage's own law has one trial.
+    The measurements leave them open. "" is as converted; "least" and "most" are at the ends of the range of a key. The
+    stage's own law has one trial.
     """
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:

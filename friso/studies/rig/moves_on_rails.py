@@ -238,7 +238,7 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and values [m] at which sampled values turn; a flat stretch counts at its end."""
+    """Return times [s] and values [m] of turning points; a flat stretch counts at its end."""
     ways = np.sign(np.diff(values))
     moving = np.flatnonzero(ways)
     turned = moving[1:][ways[moving[1:]] * ways[moving[:-1]] < 0]
@@ -246,7 +246,7 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Return the shape of swings in the last half of a run: above, below, rising, and two scatters.
+    """Return the shape of the last half's swings: above, below, rising, and two scatters.
 
     `RailRuns` describes them. They follow from turning points, times [s] and values [m]; the scatters are those of
     period and height.

@@ -43,7 +43,7 @@ class RigLog:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of an experiment on a stage: logs, a result of the experiment's own class, and `notes`."""
+    """Outcome of an experiment on a stage: logs, a result of its own class, and `notes`."""
 
     experiment: str
     stage: Stage
@@ -82,9 +82,9 @@ an unstable loop spends at either limit."""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
-    """Return the number of samples after which a command [N], (n,), only swings between its limits.
+    """Return the number of samples after which a command [N] only swings between limits.
 
-    It is 0 if the command comes to rest, or has no limits.
+    The command has shape (n,). It is 0 if the command comes to rest, or has no limits.
     """
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)

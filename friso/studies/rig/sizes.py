@@ -109,6 +109,6 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def interval(stage: Stage, length: float) -> float:
-    """Return the sample time of a log [s]: at most `length`, and a whole number of the drive's samples."""
+    """Return a log's sample time [s]: at most `length`, in whole samples of the drive."""
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

@@ -75,7 +75,7 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
-    """Return speeds [m/s] at the limit of steady motion, or some from the lowest on if all were steady."""
+    """Return speeds [m/s] at the limit of steady motion, or the lowest if all were steady."""
     speeds = controller_speeds(passed[0].stage)
     unsteady = {
         int(np.argmin(np.abs(np.log(speeds / abs(stretch.velocity)))))

@@ -208,7 +208,7 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 
 def _both(fit: Fit, which: object) -> Sweep:
-    """Return the samples of fit and test together that have an edge and groups selected by `which`."""
+    """Return the samples of fit and test with an edge and groups selected by `which`."""
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 
 

@@ -1,4 +1,4 @@
-"""Build the JSON document of `friso reproduce`: the claims of the thesis with their judgements."""
+"""Build the JSON document of `friso reproduce`: the thesis's claims and judgements."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
 
 
 def _ways(verdict: ClaimVerdict) -> dict[str, ClaimJudgement]:
-    """Return the judgement by the thesis's count and, if that matters, by what attracts the stages."""
+    """Return the judgement by the thesis's count and, if it matters, by the attractors."""
     findings = {COUNT: verdict.finding, CYCLE: verdict.attracts}
     return {way: finding.judgement for way, finding in findings.items() if finding}
 

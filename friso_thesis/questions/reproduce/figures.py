@@ -100,7 +100,7 @@ def _line(edge: Edge) -> Series:
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
-    """Return the maps of a study by title: one map, or for Fig. 14B one for each of two tolerances."""
+    """Return the maps of a study by title: one, or for Fig. 14B one per tolerance."""
     if study.panel == "14B":
         return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}
     return {f"{letter}: {study.title}": reproduction.maps[study.name]}
@@ -138,7 +138,7 @@ def _response(reproduction: Reproduction) -> Figure:
 
 
 def _shares(reproduction: Reproduction) -> Figure:
-    """Draw the P, I and D terms of the force on the locked rig, for the wide gap above the narrow one."""
+    """Draw the P, I and D terms of the force on the locked rig, wide gap above narrow gap."""
     panels = []
     for name in (WIDE, NARROW):
         trace = reproduction.responses[name].trace

@@ -1,4 +1,4 @@
-"""Show the thesis's conclusions under other friction laws: sentences, a table, the JSON document."""
+"""Show the thesis's conclusions under other friction laws, as text, table and JSON."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def _free(loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]) -> Figure:
 def _of_loops(
     number: str, title: str, caption: str, loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]
 ) -> Figure:
-    """Draw magnitude and phase of the loops at every crossover, for the model and for the measured rig."""
+    """Draw magnitude and phase of the loops at every crossover, for model and measured rig."""
     ends = loops.omega[0] / (2 * np.pi), loops.omega[-1] / (2 * np.pi)
     of_model = [ResponseCurve(response, f"tuned to {tuned:g} Hz", "") for tuned, response in loops.curves.items()]
     columns = [_panels("model", ends, [(loops.omega / (2 * np.pi), curve) for curve in of_model])]

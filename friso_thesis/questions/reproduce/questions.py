@@ -120,7 +120,7 @@ QUESTIONS: tuple[ThesisQuestion, ...] = (
 
 
 def question_rows() -> list[Sequence[str]]:
-    """Return the open questions, with commands that answer them, and answers for the thesis's rig."""
+    """Return the open questions, with commands to answer them, and the rig's answers."""
     return [(question.asked, question.command, question.shows, question.answer()) for question in QUESTIONS]
 
 

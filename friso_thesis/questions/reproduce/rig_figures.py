@@ -57,7 +57,7 @@ def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Fig
 
 
 def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
-    """Draw the measured plant with its joint locked, place by place, relative to the line of its mass."""
+    """Draw the plant with locked joint, place by place, relative to its mass line."""
     hertz = np.array(FREQUENCIES)
     omega = 2 * np.pi * hertz
     line = experiments.locked_line

@@ -1,4 +1,4 @@
-"""Show `friso rig in-position`: Fig. 28 of the thesis, and what each disturbance and damping does."""
+"""Show `friso rig in-position`: Fig. 28 of the thesis, by disturbance and damping."""
 
 from __future__ import annotations
 

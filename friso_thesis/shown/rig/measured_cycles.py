@@ -1,4 +1,4 @@
-"""Show `friso rig measured-cycles`: Fig. 27 of the thesis, and what slows simulated cycles down to it."""
+"""Show `friso rig measured-cycles`: Fig. 27 of the thesis, and what slows cycles down."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ASYMMETRY = "Difference of friction between the two sides"
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Say how the cycle on an even rail looks, what varied rails do to it, and what else slows it down."""
+    """Say how the cycle on an even rail looks, and what varied rails and other causes change."""
     result: CycleComparison = outcome.result
     even = result.even
     if not even.swings[0]:
@@ -143,7 +143,7 @@ def _other_changes(result: CycleComparison) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw Fig. 27, the maps of rails with a random field, cycles over asymmetry, and the friction levels."""
+    """Draw Fig. 27, the maps of rails, cycles over asymmetry, and the friction levels."""
     result: CycleComparison = outcome.result
     if not result.even.swings[0]:
         return [_cycles(result)]

@@ -1,4 +1,4 @@
-"""Show `friso rig stroke-crossover`: Fig. 26 of the thesis, the fraction of rails with peaks in each cell."""
+"""Show `friso rig stroke-crossover`: Fig. 26 of the thesis, fractions of rails with peaks."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _limit(counts: StrokeCrossover, row: int) -> str:
 
 
 def _needed(counts: StrokeCrossover) -> list[str]:
-    """Say where peaks end: the crossover limits by stroke, and the stroke at the stage's own crossover."""
+    """Say where peaks end: crossover limits by stroke, and the stroke at the stage's crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
     rows = np.flatnonzero(counts.share[:, counts.nearest] > 0)

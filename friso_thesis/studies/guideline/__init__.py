@@ -1,7 +1,7 @@
-"""Derive the design guideline: dimensionless groups that govern hunting, and laws of its edge.
+"""Derive the design guideline: groups that govern hunting, and laws of its edge.
 
-The edge is swept over the groups. Laws are fitted to it, and their errors are taken from samples that were not used for
-the fit.
+The groups are dimensionless. The edge is swept over the groups. Laws are fitted to it, and their errors are taken from
+samples that were not used for the fit.
 """
 
 from friso_thesis.studies.guideline.compute import SAMPLES, Fit, Guideline, guideline

@@ -83,7 +83,10 @@ class Fit:
 
     @property
     def kinds(self) -> Mapping[str, int]:
-        """Return how many samples of fit and test have each kind of edge, or each reason for having none."""
+        """Return how many samples have each kind of edge, or each reason for having none.
+
+        Samples of fit and test count.
+        """
         return Counter(self.sweep.edges.kind.astype(str))
 
     @property
@@ -208,7 +211,10 @@ def checked_samples(samples: int) -> None:
 
 
 def group_counts() -> dict[str, Count]:
-    """Return the numbers of parameters and groups: for the rigid rig, with joint, and with parasitic mode."""
+    """Return the numbers of parameters and groups of the rigid rig, with joint, and with mode.
+
+    The mode is the parasitic one.
+    """
     return {
         "rigid": group_count(plain_rig()),
         "joint": group_count(plain_rig("joint")),

@@ -36,7 +36,7 @@ only."""
 
 @dataclass(frozen=True)
 class Parameter:
-    """A physical parameter: its symbol, the stage-file keys (of one unit) that make it, and how they do."""
+    """A physical parameter: its symbol, its stage-file keys of one unit, and their formula."""
 
     written: str
     keys: tuple[str, ...]
@@ -168,7 +168,7 @@ class GroupScale:
 
     @property
     def rate(self) -> float:
-        """Return the natural frequency of the mass on its bristles [rad/s], the unit of the crossover."""
+        """Return the natural frequency [rad/s] of the mass on its bristles, the crossover's unit."""
         return float(np.sqrt(self.stiffness / self.mass))
 
 
@@ -177,7 +177,7 @@ _UNIT = GroupScale()
 
 @dataclass(frozen=True)
 class Count:
-    """Number of parameters in the equations of a structure, rank of their dimensions, number of groups."""
+    """Numbers of parameters and groups of a structure, and the rank of the dimensions."""
 
     parameters: int
     rank: int

@@ -1,4 +1,4 @@
-"""Fit laws of the edge of hunting, which combine a few frequencies, each a product of powers.
+"""Fit laws of the edge of hunting, which combine frequencies that are products of powers.
 
 A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Cross-validation
 chooses the exponents. Beginning with none, the exponent that lowers the cross-validated loss most is added, until the
@@ -200,7 +200,7 @@ def _validated(
     offset: np.ndarray,
     folds: np.ndarray,
 ) -> float:
-    """Return the cross-validated loss: on each part of the samples, with the law fitted to the others."""
+    """Return the cross-validated loss: on each part, of the law fitted to the other parts."""
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold

@@ -130,7 +130,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 
 
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
-    """Return the edges of samples with a free joint, and of all samples with their joints locked.
+    """Return the edges of samples with a free joint, and of all samples with locked joints.
 
     The first result has only samples with a locked edge, because the frequency of the joint is drawn relative to it.
     """

@@ -80,7 +80,7 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return the groups as arrays of one shape, and the frequency [Hz] of the mass on its bristles."""
+    """Return the groups as arrays of one shape, and the mass's frequency on bristles [Hz]."""
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
     arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
@@ -116,6 +116,6 @@ def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisC
 
 
 def direct(stage: Stage) -> float:
-    """Return the edge [Hz] that `friso check` finds, for a stage that hunts; NaN without an edge."""
+    """Return the edge [Hz] that `friso check` finds for a hunting stage; NaN without one."""
     edge = find_margin(stage, attracting=True)
     return edge.crossover if edge and edge.crossover else np.nan

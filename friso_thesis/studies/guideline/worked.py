@@ -1,4 +1,4 @@
-"""Work through the steps from a machine's friction range and crossover limit to its isolator.
+"""Work through the steps from friction range and crossover limit to an isolator.
 
 The machine is the thesis rig.
 """
@@ -49,7 +49,7 @@ STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
 
 @dataclass(frozen=True)
 class WorkedMachine:
-    """A machine like the rig, by its name: its edge [Hz] by the law and as `friso check` finds it."""
+    """A machine like the rig, by name: its edge [Hz] by the law and by `friso check`."""
 
     name: str
     law: float
@@ -78,7 +78,7 @@ class WorkedDesign:
 
     @property
     def worst(self) -> float:
-        """Return the highest known edge [Hz], or the least crossover tried if all edges lie below it."""
+        """Return the highest known edge [Hz], or the least tried crossover if all lie below."""
         return float(np.nanmax([FREE_GRID[0], *(case.ranked for case in self.cases)]))
 
     @property

@@ -1,1 +1,1 @@
-"""The thesis's own experiments of the rig, one module each, which pyproject.toml names in entry points."""
+"""The thesis's own experiments of the rig, one module each, named in pyproject.toml."""

@@ -67,13 +67,13 @@ class Standstill:
 
 @dataclass(frozen=True)
 class InPosition:
-    """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, one run each.
+    """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance.
 
-    `frequencies` [Hz] belong to the spectra. `damped` has runs with a free joint and all disturbances, by `damping` [N
-    s/m]; `own_damping` is the joint's. `louder` has the largest deviations [m] locked and free, by the factor on the
-    force noise. `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the stage states the floor.
-    `after_move` has, by case, runs with all disturbances after the move, as long after it as other runs after their
-    start.
+    There is one run for each. `frequencies` [Hz] belong to the spectra. `damped` has runs with a free joint and all
+    disturbances, by `damping` [N s/m]; `own_damping` is the joint's. `louder` has the largest deviations [m] locked and
+    free, by the factor on the force noise. `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the
+    stage states the floor. `after_move` has, by case, runs with all disturbances after the move, as long after it as
+    other runs after their start.
     """
 
     crossover: float
@@ -94,7 +94,7 @@ class InPosition:
 
     @property
     def recovered(self) -> np.ndarray:
-        """Return the fraction of the difference in RMS between free and locked that each damping recovers."""
+        """Return the fraction of the RMS difference, free to locked, that each damping recovers."""
         locked, free = (self.runs[case, "all"].true[0, 0] for case in CASES)
         return (free - self.damped.true[:, 0]) / (free - locked)
 
@@ -167,7 +167,10 @@ def in_position(
 
 
 def amplifier_noise(stage: Stage) -> float:
-    """Return the RMS [N] of the drive's force noise, as of rounding to `BITS` between its limits."""
+    """Return the RMS [N] of the drive's force noise, as from rounding to `BITS`.
+
+    The bits divide the range between its limits.
+    """
     flat = stage.flat()
     limit = flat.get(FORCE_LIMIT, LIMIT_FACTOR * flat.get("friction.static", 1.0))
     return float(2 * limit / 2**BITS / np.sqrt(12))
@@ -200,7 +203,7 @@ def _recorded(
 
 
 def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return time [s] and true deviation from the reference [m] of the first run, from the record's start."""
+    """Return time [s] and true deviation [m] of the first run, from the record's start."""
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]

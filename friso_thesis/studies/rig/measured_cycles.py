@@ -221,7 +221,7 @@ def moves_on_varied_rails(
     progress: Progress,
     label: str,
 ) -> tuple[RailRuns, np.ndarray]:
-    """Run the moves on all rails of all cases; return them and the asymmetry around their targets.
+    """Run all moves on all rails of all cases; return runs and asymmetry at the targets.
 
     Runs and asymmetries have the shape (cases * rails,).
     """

@@ -61,7 +61,7 @@ class StrokeCrossover:
 
     @property
     def limits(self) -> np.ndarray:
-        """Return for each stroke the crossover [Hz] up to which any rail has counted peaks, (strokes,).
+        """Return each stroke's crossover [Hz] up to which any rail has counted peaks, (strokes,).
 
         It lies halfway to the next crossover. It is 0 if no rail has any, and infinite if some have at the highest.
         """

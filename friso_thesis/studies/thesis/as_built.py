@@ -197,7 +197,7 @@ class RailTraces:
 
 
 def traces(stage: Stage, rail: int) -> RailTraces:
-    """Run single moves on the rail with a number, counted from 0, and on an even one (Fig. 24, 25, 27)."""
+    """Run single moves on a numbered rail, from 0, and on an even one (Fig. 24, 25, 27)."""
     machine = _prescribed(stage)
     frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
     held, loose = (with_joint(machine, locked) for locked in (True, False))

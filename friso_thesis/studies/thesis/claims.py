@@ -58,7 +58,7 @@ def claims() -> tuple[Claim, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """One testable statement of a claim: criterion in words, whether it is met, and the number found.
+    """One testable statement of a claim: its criterion, whether it is met, and the number.
 
     `why` gives the reason if it is not met, in whole sentences, the most important first. `printed` is a number that
     the thesis prints and `read` the one that friso finds, both in the same unit, NaN without one. A `self_test` checks

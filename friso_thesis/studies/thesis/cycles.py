@@ -1,4 +1,4 @@
-"""Find the attractors of the stages in the thesis's maps, and compare them with the peak count.
+"""Find the attractors in the thesis's maps, and compare them with the peak count.
 
 The module also follows the curves on which cycles stop attracting.
 """

@@ -1,4 +1,4 @@
-"""Compute the evidence for judges: maps of the studies, and runs in time, of the rig with changes."""
+"""Compute the evidence for judges: maps of studies, and runs of the changed rig."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class LockedLine:
 
 @dataclass(frozen=True)
 class JointSteps:
-    """Steps of the joint (Fig. 19): the record, its analysis, and the true joint stiffness [N/m]."""
+    """Steps of the joint (Fig. 19): record, analysis, and true joint stiffness [N/m]."""
 
     log: Log
     result: StepStiffness
@@ -99,7 +99,7 @@ class JointSteps:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """Slow motion (Fig. 20): speed [m/s], the record, its analysis, and the true static friction [N]."""
+    """Slow motion (Fig. 20): speed [m/s], record, analysis, and true static friction [N]."""
 
     speed: float
     log: Log
@@ -222,7 +222,7 @@ def _experiment(name: str, stage_file: str) -> Any:
 
 
 def locked_line(stage: Stage) -> LockedLine:
-    """Simulate the response of the locked rig to sines of one force, at places with different friction."""
+    """Simulate the locked rig's response to sines of one force, at places of other friction."""
     places = [
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]
@@ -251,7 +251,7 @@ def joint_steps(stage: Stage) -> JointSteps:
 
 
 def slow_motion(stage: Stage, speed: float) -> SlowMotion:
-    """Simulate stick-slip at a `speed` [m/s] with the joint free, and analyse it with its stiffness."""
+    """Simulate stick-slip at a `speed` [m/s] with the joint free, and analyse it."""
     free = stage.replace({"joint.stroke": STROKE, "joint.locked": False})
     log = _ramp(free, speed, SLOW_TIME)
     flat = stage.flat()
@@ -285,7 +285,7 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
 
 
 def _lively_rail(moves: MovesOnRails) -> int:
-    """Return the number of the first rail with counted peaks at the lowest crossover, joint locked.
+    """Return the number of the first rail with peaks at the lowest crossover, joint locked.
 
     It is the first rail if there is none.
     """

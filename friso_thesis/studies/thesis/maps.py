@@ -1,4 +1,4 @@
-"""Read maps for judges: where runs keep moving, limits, trends, and blocks that come to rest."""
+"""Read maps for judges: where runs keep moving, limits, trends, and resting blocks."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 
 
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """Return, for each column of `moving`, (n, columns), the value beyond which no run keeps moving.
+    """Return, for each column of `moving`, (n, columns), where runs stop moving.
 
     `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is where the
     `size` of the swings, interpolated in its logarithm, is 1. It is halfway between both if sizes are unknown, lie on
@@ -105,7 +105,7 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
 
 
 def overlap(part: np.ndarray, total: np.ndarray) -> float:
-    """Return the fraction of the cells of `total` that are also in `part`; NaN for an empty `total`."""
+    """Return the fraction of cells of `total` that are also in `part`; NaN for none."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 

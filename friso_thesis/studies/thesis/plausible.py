@@ -60,7 +60,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """A part of a claim over draws: the number of draws in which it is `met`, and their fraction."""
+    """A part of a claim over draws: number of draws in which it is `met`, and fraction."""
 
     met: int
     share: Share
@@ -284,9 +284,9 @@ def _fit(
     by_claim_tried: Mapping[str, Sequence[tuple[Draw, Finding | None]]],
     own: Mapping[str, Finding],
 ) -> BestFit | None:
-    """Return the draw, or friso's `own` choice, that fits the printed numbers best, by the count.
+    """Return the draw, or friso's `own` choice, that fits the printed numbers best.
 
-    A draw of which a number is unknown is left out.
+    The count decides. A draw of which a number is unknown is left out.
     """
     first = baseline()
     at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]

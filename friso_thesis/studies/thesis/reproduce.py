@@ -1,4 +1,4 @@
-"""Reproduce the thesis: run every study and response, judge every claim, and find what it depends on."""
+"""Reproduce the thesis: run its studies, judge its claims, and find what they depend on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Define the values that the thesis does not state, with plausible ranges, and draw them jointly."""
+"""Define plausible ranges of values that the thesis does not state, and draw them jointly."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class OpenValue:
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether another value may change that part of the linear analysis, or that experiment."""
+        """Tell whether another value may change that part of the analysis or that experiment."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 

@@ -1,4 +1,4 @@
-"""Define the ten studies of the thesis's Table 3 as data: the ranges as printed, including zeros."""
+"""Define the ten studies of the thesis's Table 3: ranges as printed, including zeros."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class AxisSpan:
-    """Range of one axis: the stage-file key (or free name), its ends [unit], and if it is logarithmic."""
+    """Range of one axis: the stage-file key or free name, its ends [unit], and its scale.
+
+    The scale is logarithmic or linear.
+    """
 
     key: str
     low: float

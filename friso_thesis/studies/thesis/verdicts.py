@@ -21,7 +21,7 @@ NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class ClaimVerdict:
-    """The verdict on a claim by the thesis's own count; `finding` is None if the claim is not covered.
+    """The verdict on a claim by the thesis's count; `finding` is None if it is not covered.
 
     - `attracts`: the finding by what attracts the stages (None: not computed, or it does not enter). It stands beside
       the judgement and does not decide it.

@@ -59,7 +59,7 @@ class Plant:
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """An open loop tuned to a crossover [Hz], and the frequency [Hz] at which it really crosses 0 dB.
+    """An open loop tuned to a crossover [Hz], and its true 0 dB crossing [Hz].
 
     It has no lines if the closed loop was not stable.
     """
@@ -93,7 +93,7 @@ class Frf:
 
     @property
     def highest_stable(self) -> float:
-        """Return the highest setting [Hz] below the first unstable one; NaN if the first is unstable."""
+        """Return the highest setting [Hz] below the first unstable one; NaN for none."""
         return highest_stable(self.settings, self.stable)
 
 
@@ -107,7 +107,7 @@ def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
 
 
 def crossing_near_target(loop: MeasuredLoop) -> float:
-    """Return the 0 dB crossing [Hz] nearest to the crossover that the loop is tuned for; NaN for none."""
+    """Return the 0 dB crossing [Hz] nearest to the tuned crossover; NaN for none."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 

@@ -41,7 +41,7 @@ s and 1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Bristles:
-    """Results of the presliding experiment: a fit for each place, the logs of loops, and true bristles.
+    """Results of the presliding experiment: fits by place, logs of loops, and true bristles.
 
     The true stiffness is in [N/m], the true damping in [N s/m].
     """

@@ -46,7 +46,7 @@ class Stiffness:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Run steps of the reference with the cart fixed. Raises InputError for a stage without a joint."""
+    """Run reference steps with the cart fixed. Raises InputError for a stage without a joint."""
     progress(0, 1, "position steps")
     log = steps(stage, seed)
     progress(1, 1, "")

@@ -79,7 +79,7 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
 
 @lru_cache(maxsize=256)
 def _margins(stage_file: str) -> dict[float, float]:
-    """Return the modulus margin of the settled states, by the mass [kg] for which the controller is tuned.
+    """Return the settled states' modulus margin by the mass [kg] that the controller assumes.
 
     The margin is 0 for an unstable loop.
     """
@@ -190,7 +190,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
 
 @judges("F25O", figure="25", needs=("system",), of_runs=True)
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
-    """Judge whether overshoot falls with crossover, by the swing at the end at every mass of the map."""
+    """Judge whether overshoot falls with crossover, by the final swing at every mass."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")

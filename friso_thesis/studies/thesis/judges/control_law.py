@@ -93,7 +93,7 @@ def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
 
 @judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"), of_runs=True)
 def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
-    """Judge the crossover by the margin of the free joint's loop, and by forces and settling times of runs."""
+    """Judge the crossover by the free joint's margin, and by force and settling time."""
     first = evidence.analysis.plants["stuck"].first
     runs = evidence.maps["isolator-crossover"]
     crossover, _, moving, valid = verdict_table(runs, CROSSOVER, "joint.stroke")
@@ -107,7 +107,7 @@ def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
 
 
 def judged_crossovers(margins: dict[float, float], first: float, force: float, settling: float) -> Finding:
-    """Judge margins over the crossover, and the rank correlations of force and settling time with it.
+    """Judge margins over the crossover, and its rank correlation with force and settling time.
 
     Crossovers are in `first` eigenfrequencies [Hz].
     """
@@ -143,7 +143,7 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
 
 @judges("S421", figure="Sec. 4.2.1, motor constant")
 def motor_constant_cancels(evidence: Evidence) -> Finding:
-    """Judge the loop with a stronger or weaker motor than assumed, tuned for the mass that it shows."""
+    """Judge the loop with a stronger or weaker motor, tuned for the mass that it shows."""
     flat = evidence.rig.flat()
     omega = 2 * np.pi * np.geomspace(0.1, 1e3, 100)
     own = loops(flat, member(1.0), omega)

@@ -131,7 +131,10 @@ def force_at_constant_speed(evidence: Evidence) -> Finding:
 
 
 def force_swings(runs: ConstantSpeed) -> list[float]:
-    """Return the standard deviation of the force over its mean in each pass, after a tenth of the way."""
+    """Return the force's standard deviation over its mean in each pass.
+
+    The first tenth of the way is left out.
+    """
     forces = [runs.log["force"][part] for part in runs.log.segments]
     return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
 

@@ -79,7 +79,7 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
 
 @judges("F18", figure="18", needs=(PLANT, BUILT))
 def response_of_the_free_joint(evidence: Evidence) -> Finding:
-    """Judge modes and mass line of the free joint, and whether one error would explain both masses."""
+    """Judge the free joint's modes and mass line, and whether one error explains both masses."""
     words = reading()
     plants = evidence.analysis.plants
     stuck, sliding = plants["stuck"], plants["sliding"]

@@ -1,4 +1,4 @@
-"""Judge which parameter decides most on hunting (Sec. 3.3), over the ranges of Table 3 together."""
+"""Judge which parameter decides most on hunting (Sec. 3.3), over Table 3's ranges."""
 
 from __future__ import annotations
 

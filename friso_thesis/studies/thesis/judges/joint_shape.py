@@ -66,7 +66,7 @@ def width_against_length(evidence: Evidence) -> Finding:
 
 
 def _ratios(dimension: str) -> tuple[float, float, float]:
-    """Return the factors by which three stiffnesses change: drive, along the leaves, along their width."""
+    """Return the factors of three stiffnesses: drive, along the leaves, along their width."""
     own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)
     return drive, along, across
@@ -107,7 +107,7 @@ def pushed_at_the_centre(evidence: Evidence) -> Finding:
 
 
 def judged_place(stiffness: np.ndarray, length: float) -> Finding:
-    """Judge the place from the stage's stiffness (6, 6) at the leaf ends, for leaves of a length [m].
+    """Judge the place from the stage's stiffness (6, 6) at the ends of leaves of a length [m].
 
     A force F along z that acts at a distance d from the leaf ends exerts the moment -d F about y.
     """

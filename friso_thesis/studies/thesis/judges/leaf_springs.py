@@ -116,7 +116,10 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 
 def _as_beams(young: float) -> float:
-    """Return the drive stiffness [N/m] of leaves that curl freely across their width: n 12 E I/L^3."""
+    """Return the drive stiffness [N/m] of leaves that curl freely: n 12 E I/L^3.
+
+    They curl across their width.
+    """
     own = mechanism(young, _SPACINGS[0], _HEIGHTS[0])
     return own.leaves * 12 * own.young * own.bending / own.length**3
 

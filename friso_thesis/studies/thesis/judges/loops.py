@@ -1,4 +1,4 @@
-"""Judge the open loops, simulated and measured, and how fast the controller may be (Fig. 8, 22, 23)."""
+"""Judge the open loops, and how fast the controller may be (Fig. 8, 22, 23)."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _beyond(locked: CrossoverLoops) -> str:
 
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
-    """Judge whether the loop is stable as Fig. 8 linearises it, about initial speeds of the cart."""
+    """Judge the stability of the loop as Fig. 8 linearises it, about initial cart speeds."""
     settings = FrequencySettings.current()
     unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
@@ -148,7 +148,10 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
-    """Judge the crossing of the free joint tuned for the whole mass, and its highest stable setting."""
+    """Judge the free joint's crossing, tuned for the whole mass, and its highest setting.
+
+    The setting is the highest stable one.
+    """
     words = reading()
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]

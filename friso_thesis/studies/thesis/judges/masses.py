@@ -38,7 +38,7 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
 
 @judges("F15B", figure="15B", needs=("isolator-friction", "friction"))
 def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
-    """Judge the cells that keep moving with the isolator, and those that do with the joint locked."""
+    """Judge the cells that keep moving with the isolator, and with the joint locked."""
     words = reading()
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["isolator-friction"]

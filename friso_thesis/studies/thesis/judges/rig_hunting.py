@@ -121,9 +121,10 @@ def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
 
 
 def judged_grid(grid: StrokeCrossover) -> Finding:
-    """Judge, over stroke and crossover, whether the crossover limit of hunting falls with stroke.
+    """Judge, over stroke and crossover, whether the limit of hunting falls with stroke.
 
-    Also judge that peaks are counted at every stroke at the lowest crossover, and at none at the highest.
+    The limit is a crossover. Also judge that peaks are counted at every stroke at the lowest crossover, and at none at
+    the highest.
     """
     limits, share, words = grid.limits, grid.share, reading()
     falls = trend(grid.strokes, limits)

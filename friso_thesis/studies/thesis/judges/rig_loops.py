@@ -1,4 +1,4 @@
-"""Add what the rig with its real drive shows (Fig. 17, 18, 22, 23), measured as in the thesis."""
+"""Add what the rig with its real drive shows, measured as in Fig. 17, 18, 22, 23."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def _written(expression: sp.Basic) -> str:
 
 
 def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:
-    """Judge a formula for the stiffness, in K_F and K_J, against the plant of the declared equations."""
+    """Judge a stiffness formula in K_F and K_J against the plant of the declared equations."""
     eta = springs.joint / springs.bristles
     expected = float(stiffness.subs({K_F: springs.bristles, K_J: springs.joint}))
     return Part(

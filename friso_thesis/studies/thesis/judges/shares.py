@@ -1,4 +1,4 @@
-"""Judge Fig. 13: the shares of the controller's force while the stage sticks, at two friction gaps."""
+"""Judge Fig. 13: the force's shares while the stage sticks, at two friction gaps."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Sticking:
         return {1, -1} <= set(self.direction)
 
     def words(self, values: np.ndarray, written: Callable[[float], str]) -> str:
-        """Return the overall mean and the means in the two directions as text, formatted by `written`."""
+        """Return the overall mean and both directions' means as text, formatted by `written`."""
         if not self.both:
             return "no cycle"
         forward, back = (written(float(values[self.direction == direction].mean())) for direction in (1, -1))
@@ -93,7 +93,7 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
 
 
 def sticking(response: Response) -> Sticking:
-    """Return the sticks of a response that end in break-away, after the time from which peaks count.
+    """Return a response's sticks that end in break-away, after the start of peak counting.
 
     A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it. The fraction of the
     integral action is taken where the friction force is largest within the stick, before it drops.

@@ -34,8 +34,9 @@ NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare.
 class ArguedCycle:
     """A motion after the return, reduced to the quantities of the thesis's arguments.
 
-    They are the overshoot beyond the reference [m] of a cycle (NaN if there is none), the mean rate [N/s] at which the
-    integral action changes until peaks are counted, and the sticks.
+    `overshoot` [m] is that of the cycle beyond the reference (NaN without a cycle). `build_up` [N/s] is the mean rate
+    at which the integral action changes until peaks are counted. `stick` describes the sticks that end in
+    break-away.
     """
 
     overshoot: float
@@ -66,7 +67,10 @@ def _against(first: float, second: float, unit: str, names: tuple[str, str]) -> 
 
 @judges("S41M", figure="Sec. 4.1, mass step by step", needs=(LIGHT, HEAVIEST))
 def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
-    """Judge how fast the integral action changes with a light and a heavy mass, and how the heavy one ends."""
+    """Judge how fast the integral action changes with a light and a heavy mass.
+
+    How the heavy mass ends is judged as well.
+    """
     light, heavy = (cycle_of(evidence.responses[name]) for name in (LIGHT, HEAVIEST))
     counted = int(evidence.responses[HEAVIEST].cell["count"])
     return Finding(

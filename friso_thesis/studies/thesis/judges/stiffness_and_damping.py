@@ -83,7 +83,7 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """Judge the stroke from which runs come to rest with a strongly damped limiter, and the amplitude."""
+    """Judge the stroke from which runs rest with a strongly damped limiter, and the amplitude."""
     words = reading()
     runs, axes = evidence.maps["isolator-damping"], ("joint.stroke", "joint.limiter_damping")
     stroke, damping, moving, _ = verdict_table(runs, *axes)
@@ -154,7 +154,7 @@ def _rounded(value: float) -> str:
 
 
 def _by_decade(damping: np.ndarray, needed: np.ndarray) -> FindingTable:
-    """Return a table of the stroke needed [m], (n,), over the limiter's damping [N s/m], by decade."""
+    """Return a table of the stroke needed [m], (n,), by decade of limiter damping [N s/m]."""
     decades = np.floor(np.log10(damping * (1 + 1e-9))).clip(max=np.ceil(np.log10(damping[-1])) - 1)
     rows = []
     for decade in np.unique(decades):

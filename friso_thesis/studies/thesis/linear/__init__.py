@@ -1,4 +1,4 @@
-"""Analyse the thesis's rig as a linear system: its limit cases, its loops and its cart speeds."""
+"""Analyse the thesis's rig as a linear system: limit cases, loops and cart speeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compute the loops of the rig at the thesis's crossovers, and how fast its controller may be.
+"""Compute the rig's loops at the thesis's crossovers, and how fast it may be controlled.
 
 This is done with and without its drive.
 """
@@ -96,7 +96,7 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
-    """Return the highest crossover [Hz] up to which the loop of the sliding stage crosses 0 dB once.
+    """Return the highest crossover [Hz] up to which the sliding loop crosses 0 dB once.
 
     A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if the
     search ends first, and 0 if there is no such crossover.

@@ -63,7 +63,7 @@ class LimitCase:
 
 @dataclass(frozen=True)
 class Springs:
-    """Stiffness [N/m] of the `joint`, of the cart's `bristles`, and of the plant at rest (`both`)."""
+    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the resting plant (`both`)."""
 
     joint: float
     bristles: float
@@ -101,7 +101,7 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Return the frequencies [Hz] at which the magnitude peaks; for a negative sign, its inverse."""
+    """Return the frequencies [Hz] of magnitude peaks; for a negative sign, of its inverse."""
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))

@@ -1,4 +1,4 @@
-"""Try changes that would make the model match the measurements: other masses, a softer contact."""
+"""Try changes that would make the model match measurements: masses, a softer contact."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ LITTLE = "1 N*s/m"
 
 @dataclass(frozen=True)
 class Contact:
-    """A contact of cart and stage so soft that its mode lies at the further crossing that was measured.
+    """A contact of cart and stage so soft that its mode lies at the further crossing.
 
-    It has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop, locked at the highest setting, with the
-    rig's limiter damping; `undamped` are those with little damping.
+    That crossing was measured. The contact has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop,
+    locked at the highest setting, with the rig's limiter damping; `undamped` are those with little damping.
     """
 
     stiffness: float
