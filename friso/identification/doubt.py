@@ -168,7 +168,7 @@ class FitCase(FittedCase):
         self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
         """Return the finding of the leading effect, by which bristles would seem to bend."""
-        refuses = dict.fromkeys(BRISTLES, IMITATED)
+        refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
         return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
 

@@ -86,7 +86,7 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 @lru_cache
 def _smoothing(order: int, cutoff: float) -> np.ndarray:
     """Design a Butterworth filter, once, with a cut-off over half the sampling."""
-    return butter(order, cutoff, output="sos")
+    return np.asarray(butter(order, cutoff, output="sos"))
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
