@@ -104,10 +104,10 @@ def main() -> NoReturn:
     Wrong input ends in one message and status 2, never in a traceback.
     """
     gc.set_threshold(*GARBAGE)
-    sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # None where the caller closed them
+    sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # a closed stream
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors=SPELLED)  # a terminal that knows no minus sign still gets its answer
+            stream.reconfigure(errors=SPELLED)  # a terminal without a minus sign still shows the answer
     with escaping():
         sys.exit(_status())
 
@@ -153,7 +153,7 @@ def _run() -> int:
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
     try:
-        if len(sys.argv) == 1 and "_FRISO_COMPLETE" not in os.environ:  # by which a shell asks what fits
+        if len(sys.argv) == 1 and "_FRISO_COMPLETE" not in os.environ:  # set by a shell that asks for completions
             print(TOUR)
             return 0
         refuse_empty(sys.argv[1:])
@@ -163,7 +163,7 @@ def _run() -> int:
         if {"-h", "--help"} & {*sys.argv[1:2]}:
             app.info.epilog = _plug_ins()
         return copy_context().run(app, standalone_mode=False) or 0
-    finally:  # another run in this process has another standard error
+    finally:  # another run in this process may have another standard error
         log.removeHandler(messages)
 
 
@@ -174,7 +174,7 @@ def _failed(error: BaseException) -> int:
     """
     if isinstance(error, typer.Exit):
         return error.exit_code
-    exits = isinstance(error, SystemExit)  # which typer makes of it
+    exits = isinstance(error, SystemExit)  # typer raises it for such errors
     if isinstance(error.__context__ if exits else error, BrokenPipeError):
         sys.stderr.close()
         return 1

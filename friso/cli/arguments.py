@@ -48,7 +48,7 @@ def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def _named(function: Callable[..., None], name: str) -> tuple[str, str]:
-    """Return the name of a path on the command line, and an example of its use."""
+    """Return the name of a path's option on the command line, and an example of its use."""
     (info,) = get_type_hints(function, include_extras=True)[name].__metadata__
     if isinstance(info, ArgumentInfo):
         return str(info.metavar), "rig.toml"
@@ -86,13 +86,13 @@ def _value_of(option: str, arguments: Sequence[str]) -> str:
     """Return the last value of an option on the command line, in quotes."""
     values = [value for before, value in pairwise(arguments) if before == option]
     values += [argument.partition("=")[2] for argument in arguments if argument.startswith(f"{option}=")]
-    from friso.quantities import quoted  # its libraries are not needed where nothing is refused
+    from friso.quantities import quoted  # imported only here, because it is rarely needed
 
     return quoted(values[-1]) if values else "no number"
 
 
 def parted_path(words: Sequence[str]) -> str:
-    """Return a hint if several words together are the path of an existing file.
+    """Return a hint to use quotes if several words together are the path of an existing file.
 
     Such a path contains blanks and lacks its quotes. Otherwise the hint is empty.
     """

@@ -1,4 +1,4 @@
-"""Answer every command: ask the friso function of its name and show the answer.
+"""Answer every command: call the friso function of its name and show the answer.
 
 The conclusion comes first, then small tables and what to do next. Details follow if they are asked for.
 """
@@ -33,7 +33,7 @@ DRAWING = "drawing the page"
 
 @dataclass(frozen=True)
 class Shown:
-    """Options that say where an answer goes: the folder for its files, and what is printed.
+    """Options on showing an answer: the folder for its files, and what is printed.
 
     `overwrite` allows the command to replace files in the folder.
     """
@@ -47,8 +47,8 @@ class Shown:
 def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown, **kept: Any) -> None:
     """Ask a question `about` files, write its files, and show the answer.
 
-    `options` are those of its command, and `kept` are further keywords of the function. Raises InputError for wrong
-    input. Raises typer.Exit with the status of a failure.
+    `options` are the command's options by name, and `kept` are further keywords of the function. Raises InputError for
+    wrong input. Raises typer.Exit with the status of a failure.
     """
     if question.answers_interrupted:
         answers_interrupts()
@@ -74,13 +74,13 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
 def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
     """Write files and return them, or return none and the reason why writing failed.
 
-    What was computed is shown all the same. `nothing` says what is missing then.
+    The answer is shown even if writing fails; `nothing` says what is then missing.
     """
     try:
         return write(), ""
     except OSError as error:
         return [], f"{nothing}: {cause_of(error)}: {path_of(error)}".removesuffix(": ")
-    except InputError as error:  # what came in the way since it was looked
+    except InputError as error:  # a file may have appeared since the check
         return [], f"{nothing}: {error.actual}; expected: {error.expected}"
 
 
@@ -101,7 +101,7 @@ def show(
             print(f"\n{block}\n")
         tables = answer.tables()
         behind = any(table.behind for table in tables)
-        more = answer.details() if details or not behind else ()  # they may take work
+        more = answer.details() if details or not behind else ()  # details may take work
         for table in tables:
             if details or not table.behind:
                 print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])

@@ -1,6 +1,6 @@
 """Collect the commands of friso.
 
-There is one for each question, and a few ask none (`friso/cli/commands/`).
+Each question has a command; a few commands ask no question (`friso/cli/commands/`).
 """
 
 from __future__ import annotations

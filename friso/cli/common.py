@@ -28,7 +28,7 @@ def say(message: str) -> None:
 def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
     """Print a table with named rows.
 
-    Columns that do not fit side by side go into further tables below.
+    Columns that do not fit side by side are printed in further tables below.
     """
     from rich.table import Table
 
@@ -57,7 +57,7 @@ _BORDER = 3
 """Width between two columns of a table, in characters."""
 
 _LEAST = 8
-"""Width, in characters, that a column beside the names may always have."""
+"""Smallest width, in characters, of a column beside the row names."""
 
 
 def _narrow(texts: Sequence[str]) -> int:
@@ -68,9 +68,9 @@ def _narrow(texts: Sequence[str]) -> int:
 
 
 def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
-    """Return which columns stand together in each table.
+    """Group columns into tables that fit the width, by index.
 
-    The first column, which names the rows, stands in every table with at least one other.
+    The first column, which names the rows, is in every table, with at least one other column.
     """
     parts = [[0]]
     for k in range(1, len(narrow)):

@@ -22,7 +22,7 @@ from friso.stage.arguments import KINDS, ArgumentKind, alternatives
 
 @dataclass(frozen=True)
 class CommandParameter:
-    """A parameter of a question's function as its command shows it."""
+    """A parameter of a question's function, as its command takes and shows it."""
 
     name: str
     kind: ArgumentKind
@@ -41,7 +41,7 @@ def command_function(question: Question) -> Callable[..., None]:
         ask_by_values(question, values)
 
     parameters = [*_asked(question), *_of_the_shell(question)]
-    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]  # what inspect.signature reads first
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]  # inspect.signature reads it first
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     command.__doc__ = command_help(question)
     return command

@@ -38,4 +38,4 @@ def print_written(files: Iterable[Path]) -> None:
 
 
 _PICTURES, _FEW = (".png", ".svg", ".pdf"), 6
-"""Suffixes of pictures, and how many of them are listed one by one."""
+"""Suffixes of pictures, and the largest number of pictures listed one by one."""

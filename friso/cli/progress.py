@@ -22,9 +22,10 @@ LINES = 10.0
 """Time [s] between lines of progress where no terminal shows a bar."""
 
 SHARE, STEPS = 0.05, 100
-"""Part of the work that must be done before the remaining time is estimated.
+"""Work that must be done before the remaining time is estimated.
 
-It is this fraction of all steps, or this number of steps if fewer."""
+The work is a fraction of all steps (SHARE), or a number of steps (STEPS) if fewer.
+"""
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
@@ -33,9 +34,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     Where standard error is no terminal, a line is printed every `LINES` seconds.
 
     The bar is a `friso.progress.Progress`. Without a total it shows `label` and only moves. If fewer steps are done
-    than before, or the total changes, new work has begun, and its time counts from there. The time to go never rises
-    while one piece of work is done: steps that take longer than those before hold it. A line without news is not
-    printed.
+    than before, or the total changes, new work has begun, and its time counts from there. The displayed time left never
+    rises during one piece of work: slower steps only hold it. A line equal to the previous line is not printed.
     """
 
     def __init__(self, label: str = "") -> None:
@@ -43,7 +43,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         self.label = label
         self.begun = WORK_CLOCK.now()
         self.done = self.total = self.before = 0
-        self.shortest = math.inf  # time to go told so far [s]
+        self.shortest = math.inf  # time left that was shown last [s]
         self.display: Display | None = None
         self.task: TaskID | None = None
         self.ended, self._turn = Event(), Lock()
@@ -57,7 +57,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display = _display(self._to_go)
             self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
-            self._log.setLevel(logging.INFO)  # who waits is told early what is certain
+            self._log.setLevel(logging.INFO)  # a waiting user learns early what is certain
         else:
             self.clock = Thread(target=self._tell, args=(sys.stderr,), daemon=True)
             self.clock.start()

@@ -60,7 +60,7 @@ def escaping() -> Iterator[None]:
 def console(stream: TextIO, **options: Any) -> Console:
     """Return rich's console for a stream.
 
-    Its own escape sequences reach the stream, so texts have to be escaped beforehand. Names such as ":x:" stay text.
+    Escape sequences of rich reach the stream, so texts must be escaped beforehand. Names such as ":x:" stay text.
     """
     from rich.console import Console
 
@@ -101,7 +101,7 @@ def _spelling(character: str) -> str:
 
 _SPELLINGS = {
     **dict.fromkeys("−–—", "-"),
-    **dict.fromkeys("“”", "'"),  # which no JSON text ends at
+    **dict.fromkeys("“”", "'"),  # no JSON text ends there
     **{block: str(height) for height, block in enumerate("▁▂▃▄▅▆▇█", 1)},
     **{"…": "...", "×": "x", "·": "*", "±": "+-", "≤": "<=", "√": "sqrt ", "°": " deg", "µ": "u", "μ": "u"},
 }

@@ -45,7 +45,7 @@ def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
 
 
 def _change(relaxation: Relaxation) -> float:
-    """Return the size of a change, as the logarithm of a factor."""
+    """Return how far a requirement is relaxed, as the logarithm of the factor on its value."""
     return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 

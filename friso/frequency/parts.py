@@ -31,7 +31,7 @@ FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "referenc
 FEEDFORWARD = "reference velocity", "reference acceleration", "reference jerk"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
 RATED = "velocity's encoder"
-"""Name of the position from which the velocity is taken."""
+"""Name of the position signal that the drive differentiates to a velocity: the velocity encoder's, if separate."""
 
 _REFERENCE, _POSITION, _VELOCITY, *_DERIVATIVES = (
     sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend", "r_jerk")

@@ -104,7 +104,8 @@ class FrequencySettings(Settings):
     """Largest gap of a periodic state, in relative tolerances of the run."""
 
     widest_gap: float = setting(1e-4, "")
-    """Largest gap of a periodic state at any tolerance, which shows in the third digit of stiffness."""
+    """Largest relative mismatch of a state after one period, at any tolerance. It changes the third digit of
+    stiffness."""
 
     secant_steps: int = setting(12, "")
     """Most secant steps. States that need more repeat only after several periods."""
@@ -119,7 +120,7 @@ class FrequencySettings(Settings):
     """Newton steps for laws with one state, which converge in a handful."""
 
     state_error: float = setting(1e-12, "")
-    """Change of the state that is rounding."""
+    """Largest Newton step of the friction state, relative to the state, at which the state has converged."""
 
     light_damping: float = setting(0.3, "")
     """Damping ratio below which a pole has a peak that a frequency grid could miss."""

@@ -15,14 +15,14 @@ from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
-"""The determined estimates of one experiment, with their correlation matrix, shape (estimates, estimates)."""
+"""Determined estimates of one experiment, with their correlation matrix, shape (estimates, estimates)."""
 
 
 def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     """Combine all estimates into one per key, and list disagreements in sentences.
 
-    Estimates are weighted by their intervals; if some disagree, the interval is widened. An experiment that determines
-    a key overrides those that cannot. If none determines it, the range that all leave possible remains.
+    Estimates are weighted by their intervals; if some disagree, the interval is widened. Experiments that determine a
+    key override experiments that only bound it. If none determines the key, the common range of all remains.
     """
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):
@@ -49,10 +49,11 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the keys of groups of estimates, and correlations once combined, (keys, keys).
+    """Return the keys of groups of estimates, and the correlations of their combined values.
 
-    `estimates` come from all experiments. A combined value is a mean of single ones with weights a_i, and experiments
-    are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one experiment.
+    `estimates` come from all experiments; the correlations have the shape (keys, keys). A combined value is a weighted
+    mean of independent experiments, so the covariance is the sum of A_i C_i A_i, with weights A_i (diagonal) and the
+    covariance C_i within experiment i.
     """
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
@@ -62,7 +63,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
     for group, matrix in groups:
         shares = np.array(
             [_weight(estimate) ** 0.5 / precision[estimate.name] for estimate in group]
-        )  # a_i times the deviation
+        )  # a_i times the standard deviation
         places = [keys.index(estimate.name) for estimate in group]
         covariance[np.ix_(places, places)] += (matrix - np.eye(len(group))) * np.outer(shares, shares)
     size = np.sqrt(np.diag(covariance))
@@ -81,7 +82,7 @@ def _weight(estimate: Estimate) -> float:
 
 
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the weighted mean of estimates of one key, and whether they agree by a chi-square test.
+    """Return the weighted mean of one key's estimates, and whether they agree (chi-square).
 
     If they scatter more than their own intervals allow, the interval is wider by the Birge ratio (Birge 1932,
     doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average out. If the
@@ -113,8 +114,7 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     """Return the mean of values, shape (n,), that scatter by more than their variances.
 
     A common variance is added, just large enough to explain the scatter (Paule, Mandel 1982, doi:10.6028/jres.087.022).
-    The degrees of freedom are those of the number of values with equal weight, because an uncertain value says little
-    about the scatter.
+    The degrees of freedom count effectively equal weights, because an uncertain value says little about the scatter.
     """
 
     def excess(added: float) -> float:
@@ -127,7 +127,10 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
 
 def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the common range of estimates without a value, and whether there is one; else the range that spans all."""
+    """Return the common range of estimates without a value, or else the range of all.
+
+    Also tells whether there is a common range.
+    """
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
     ] or estimates[:1]
@@ -141,7 +144,7 @@ def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bo
 
 
 def _reasons(reasons: Sequence[str]) -> str:
-    """Join reasons; of reasons that differ only in numbers, name the first and count the others."""
+    """Join reasons; if several differ in numbers only, name the first and count the rest."""
     alike: dict[str, list[str]] = {}
     for reason in dict.fromkeys(reasons):
         alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", reason), []).append(reason)

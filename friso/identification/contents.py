@@ -46,7 +46,7 @@ class ChannelContent:
 
     @property
     def missing(self) -> int:
-        """Return how many samples are not numbers."""
+        """Return the number of samples that are NaN."""
         return int(np.count_nonzero(~np.isfinite(self.values)))
 
     @property
@@ -61,7 +61,7 @@ class ChannelContent:
         settings = IdentificationSettings.current()
         parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
-        # divided first: the sum of huge values is infinite
+        # divided first, because the sum of huge values is infinite
         return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])
 
 
@@ -69,9 +69,9 @@ class ChannelContent:
 class LogContent:
     """Contents of a log file, before anything is identified.
 
-    It has the title of its format, its channels or its frequency response, and the kind of experiment with the reason
-    ("" if open). `read` are lines about the reading, `gaps` what the user must state before identification, and
-    `options` the ones used for reading.
+    Fields are the title of the file's format, its channels or frequency response, and the kind of experiment with the
+    reason ("" if open). `read` has lines on how the file was read, `gaps` what the user must state before
+    identification, and `options` the options used for reading.
     """
 
     path: Path
@@ -92,9 +92,9 @@ class LogContent:
 
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
-    """Read the contents of a file, mapped by the options or by a mapping stored beside it or in `folder`.
+    """Read the contents of a file, mapped by options or by a stored mapping.
 
-    Raises LogError for a file that cannot be read.
+    A mapping is stored beside the file or in `folder`. Raises LogError for a file that cannot be read.
     """
     name = file_format(path)
     title = FORMATS[name].title
@@ -119,7 +119,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
-    """Return the log as it would be identified, its kind, and the reason for that kind.
+    """Return the log as for identification, its kind of experiment, and the reason.
 
     Raises LogError, and GapsError for missing information.
     """

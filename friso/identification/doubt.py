@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from friso.identification.quality import Quality
 
 IMITATED = "what the model lacks would pass for it"
-"""Reason why bristles are not reported for a record that the model does not describe to its noise."""
+"""Reason given where bristles are not reported because the model does not describe the record to its noise."""
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
@@ -73,7 +73,7 @@ class RecordCase:
 class ValueCase(RecordCase):
     """A log of moves with checks of its inverse model.
 
-    The model `lacks` something, or the record is `poor`.
+    `lacks` tells that the model lacks something, `poor` that it does not describe the record.
     """
 
     lacks: bool = False
@@ -84,9 +84,9 @@ class ValueCase(RecordCase):
 class TriedForces:
     """Forces [N] of an effect that the model leaves out, each of shape (n,) and of size 1.
 
-    `units` are the small sizes at which they are tried. `label` distinguishes hypotheses of one effect, such as the
-    width of a play [m]. `searched` is the number of hypotheses from which this one was chosen, because chance explains
-    more of many. The largest size is at least `least`; a smaller or negative one is another effect.
+    `units` are the small sizes at which the forces are simulated. `label` distinguishes hypotheses of one effect, such
+    as the width of a play [m]. `searched` is the number of hypotheses from which this one is chosen, because the best
+    of many explains more by chance. Unless the largest fitted size is at least `least`, another effect is the cause.
     """
 
     forces: Sequence[np.ndarray]
@@ -127,14 +127,14 @@ class FitCase(FittedCase):
 
     @property
     def has_cause(self) -> bool:
-        """Tell whether a cause of the residual is already named; it may imitate others."""
+        """Tell whether a cause of the residual is already named, which may imitate other causes."""
         explaining = any(finding.explains for finding in self.quality.findings)
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
     def may_name(self, doubt: str) -> bool:
         """Tell whether a doubt may name its cause.
 
-        It may if it leads, or if no doubt leads and no other cause has been named.
+        A doubt may if its effect leads, or if no effect leads and no other cause has been named.
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
@@ -144,22 +144,23 @@ class FitCase(FittedCase):
         return not (self.quality.failed or self.quality.rejected)
 
     def led_by(self, doubt: str) -> LeadingEffect | None:
-        """Return the leading effect if it is that of a doubt, and the fit describes the log."""
+        """Return the leading effect if it belongs to the `doubt` and the fit describes the log."""
         return self.leading if self.describes and self.leading is not None and self.leading.doubt == doubt else None
 
     def explained(
         self, forces: Callable[[FittedCase], Iterable[TriedForces]]
     ) -> Iterator[tuple[TriedForces, ExplainedResidual]]:
-        """Yield forces of an effect that explain a part of what a fit of the log leaves."""
+        """Yield those forces of an effect that explain a part of the fit's residual."""
         for tried in forces(self) if self.describes else ():
             explained = explained_by_forces(self.fit, tried.forces, tried.units)
             if explained is not None:
                 yield tried, explained
 
     def reaching(self, moved: np.ndarray, further: Mapping[str, float] | None = None) -> OutputErrorFit:
-        """Return the fit with intervals that reach over the shift by an effect.
+        """Return the fit with intervals widened by the shift that an effect causes.
 
-        `moved` is the shift, shape (free,); some numbers reach `further`, by name.
+        `moved` is the shift of the fitted numbers, shape (free,); `further` has larger reaches of some parameters, by
+        name.
         """
         reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
         return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
@@ -167,7 +168,7 @@ class FitCase(FittedCase):
     def named(
         self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return the finding of the leading effect, by which bristles would seem to bend."""
+        """Return the finding of the leading effect, which refuses bristles that it may imitate."""
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
         return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
@@ -175,14 +176,14 @@ class FitCase(FittedCase):
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return the finding of a leading effect along the way, unnamed if it is small."""
+        """Return the finding of a leading effect that varies along the way, unnamed if small."""
         finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
         small = size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
         return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
-        """Return the case with a finding added, and with the finding's consequences for the fit."""
+        """Return the case with a finding and its consequences for the fit."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
@@ -191,7 +192,7 @@ class FitCase(FittedCase):
 
 @dataclass(frozen=True)
 class LeadingEffect:
-    """The effect whose forces explain most of the residual of a fit, by the name of its doubt."""
+    """The effect whose forces explain most of the residual of a fit, with its doubt's name."""
 
     doubt: str
     tried: TriedForces
@@ -223,13 +224,13 @@ class KeyCase(FitCase):
 
 @dataclass(frozen=True)
 class RaisedDoubt:
-    """A doubt with a finding: its cause in `words` ("" if estimates state it), and its `size` with a `unit`.
+    """A doubt with a finding: its cause in `words`, and its `size` with a `unit`.
 
-    Consequences: intervals reach to the values of the inverse model `without` the effect, and to the ends `reaches` by
-    quantity of the inverse model; `fit` and `inverse` have intervals that allow for the effect; `answers` replace
-    estimates of the same key; `refuses` names keys that are not reported, with the reason; a doubt that `spoils` the
-    record can pass for friction at low speed. A doubt that `explains` the residual keeps others that would explain it
-    from being named. `doubt` is the name of the file.
+    The `words` are "" if estimates state the cause. Consequences: intervals are extended to the values of the inverse
+    model `without` the effect, and to `reaches`, by quantity of the inverse model. `fit` and `inverse` have intervals
+    that allow for the effect. `answers` replace estimates of the same key. `refuses` maps keys that are not reported to
+    the reason. An effect that `spoils` the record can be mistaken for friction at low speed. If an effect `explains`
+    the residual, no other explanation is named. `doubt` is the doubt's name.
     """
 
     words: str = ""
@@ -250,10 +251,10 @@ class RaisedDoubt:
 class Doubt:
     """An effect that may be in a log and is not in the model, named by its module (`DOUBTS`).
 
-    `find` yields findings from the case at its `moment`. The reference shows what it `looks_at`, its `consequence`, and
-    by which measurement it is `decided_by`. `after` names doubts that are examined before. `forces` returns forces that
-    the effect would add, to be fitted to the residual: the doubt that explains most of it leads, and the others do not
-    name a cause.
+    `find` yields findings from the case at its `moment`. The docs list what it `looks_at`, its `consequence`, and the
+    measurement by which it is `decided_by`. `after` names doubts that are examined earlier. `forces` returns forces
+    that the effect would add, to be fitted to the residual: the doubt whose forces explain most leads, and no other
+    doubt names a cause.
     """
 
     moment: Moment
@@ -283,9 +284,8 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
 def causes(case: RecordCase) -> list[RaisedDoubt]:
     """List possible faults of a log that a mass with friction does not describe.
 
-    Faults of the log come first, then effects with which the inverse model fits much better, the best first, without
-    those that fit much worse than the best. Causes that count only without such effects come last. Returns [] if
-    nothing explains the log.
+    Faults of the log come first; then effects with which the inverse model fits much better, sorted by fit, unless much
+    worse than the best; last, causes that count only without such effects. Returns [] if nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))
@@ -306,7 +306,7 @@ def way_of(velocity: np.ndarray) -> np.ndarray:
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Return the effect whose forces explain most of the residual of a fit, or None if none explains enough."""
+    """Return the effect whose forces explain most of a fit's residual; None if too little."""
     best: LeadingEffect | None = None
     searches = [(name, tries) for name in _at("fit") if (tries := DOUBTS[name].forces) is not None]
     every = [(name, tried) for name, tries in searches for tried in tries(case)]
@@ -331,7 +331,7 @@ def leading_effect(case: FittedCase) -> LeadingEffect | None:
 
 
 def judged_fit(case: FitCase) -> FitCase:
-    """Examine all doubts about a fit in turn, each with the fit as changed by earlier ones."""
+    """Examine all doubts about a fit in turn, each with the fit changed by earlier doubts."""
     for name in _at("fit"):
         for finding in _named(name, case):
             case = case.with_finding(finding)
@@ -339,7 +339,7 @@ def judged_fit(case: FitCase) -> FitCase:
 
 
 def judged_keys(case: KeyCase) -> KeyCase:
-    """Examine all doubts about estimates in turn, each with the estimates as changed by earlier ones."""
+    """Examine all doubts about estimates in turn, each with estimates changed by earlier doubts."""
     for name in _at("key"):
         for finding in _named(name, case):
             case = case.with_answers(finding)
@@ -347,9 +347,9 @@ def judged_keys(case: KeyCase) -> KeyCase:
 
 
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
-    """Return the determined estimates for which there are reasons as not determined, by key.
+    """Turn determined estimates into undetermined ones, by key, where `reasons` refuse them.
 
-    If Coulomb friction is refused, its interval becomes that of dry friction at low speed, of which it is a part.
+    The interval of a refused Coulomb friction becomes the interval of all dry friction at low speed.
     """
     ratio = OutputErrorSettings.current().highest_friction_ratio
     return {

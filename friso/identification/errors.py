@@ -15,11 +15,10 @@ from friso.identification.spread import correlation_length
 
 @dataclass(frozen=True)
 class SimulationErrors:
-    """Relative errors of a simulated record: norm of measured minus simulated over norm of measured.
+    """Relative errors of a simulated record: norm of the difference over norm of the measured.
 
-    They are given for position, velocity, acceleration and force; velocity and acceleration of both records come from
-    one filter. A stage that follows the log's position has only the error of the force: the part that the model does
-    not explain.
+    Errors are given for position, velocity, acceleration and force; one filter gives velocity and acceleration of both
+    records. For a stage that follows the log's position, only the force has an error: its unexplained part.
     """
 
     position: float
@@ -33,8 +32,8 @@ class Residual:
     """Residual force of a fit [N] and its properties.
 
     `rms` and `mean` are in newtons, `correlation_time` [s] is the time over which it stays correlated. `by_position`
-    and `by_velocity` are the fractions of its power that its means over places along the rail, and over speeds,
-    explain.
+    and `by_velocity` are the fractions of the residual's power explained by its means over places along the rail, and
+    over speeds.
     """
 
     rms: float
@@ -50,7 +49,7 @@ class Residual:
 
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
-    """Compare a simulated record with some samples of a log; `bandwidth` [Hz] is the motion's."""
+    """Compare a simulated record with a part of a log; `bandwidth` [Hz] is the motion's."""
     settings = IdentificationSettings.current()
     measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
     modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
@@ -64,7 +63,7 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the error of a stage that follows the log's position: the force needed to hold it there."""
+    """Return the error of a stage that follows the log's position: the guiding force."""
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 

@@ -9,7 +9,7 @@ import numpy as np
 from friso.intervals import COVERAGE
 
 NO_INTERVAL = "how far off it may be is not known"
-"""Reason why a value without a finite interval is not determined."""
+"""Reason given for a value that counts as not determined because it has no finite interval."""
 
 
 @dataclass(frozen=True)

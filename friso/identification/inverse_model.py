@@ -1,10 +1,9 @@
-"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, filtered and decimated in the same
-way.
+"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, with both sides filtered alike.
 
-The filtering is that of Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
+The filtering follows Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
 Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
 and back, at five times the bandwidth of the motion, derivatives by central differences, and all columns and the force
-decimated to 2.5 times that bandwidth by one more filter.
+decimated to 2.5 times the bandwidth by another filter.
 """
 
 from __future__ import annotations
@@ -36,9 +35,9 @@ NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 class InverseModel:
     """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with its data.
 
-    It has `estimates`, and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and "...
-    backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and forces
-    [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
+    `estimates` have intervals; `solution` has the plain coefficients by name ("mass"; per direction "... forward" and
+    "... backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and
+    forces [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
     """
 
     estimates: tuple[Estimate, ...]
@@ -74,7 +73,10 @@ class FilteredMotion:
 
 
 def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Smooth positions [m], (..., n), forward and back below `cutoff` [Hz], where that is below half the sampling."""
+    """Smooth positions [m], (..., n), forward and back below `cutoff` [Hz].
+
+    Positions stay unchanged if the cut-off is above half the sampling frequency.
+    """
     settings = IdentificationSettings.current()
     if cutoff >= 0.5 / sample_time:
         return position
@@ -85,15 +87,15 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 
 @lru_cache
 def _smoothing(order: int, cutoff: float) -> np.ndarray:
-    """Design a Butterworth filter, once, with a cut-off over half the sampling."""
+    """Design a Butterworth filter (cached); the cut-off is relative to half the sampling rate."""
     return np.asarray(butter(order, cutoff, output="sos"))
 
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
     """Smooth a position [m], (n,), forward and back below `cutoff` [Hz], and differentiate it.
 
-    If the cut-off is near the sampling frequency, derivatives are those of a spline: differences would lose a part of
-    the acceleration.
+    If the cut-off is near the sampling frequency, derivatives are taken from a spline, because differences would lose a
+    part of the acceleration.
     """
     settings = IdentificationSettings.current()
     smooth, filtered = smoothed(position, sample_time, cutoff), cutoff < 0.5 / sample_time
@@ -104,15 +106,15 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
     curve = make_interp_spline(time, smooth, k=5)
     velocity, acceleration = (curve.derivative(order)(time) for order in (1, 2))
     if filtered:
-        acceleration[[0, -1]] = acceleration[[1, -2]]  # the filter leaves a kink at the ends
+        acceleration[[0, -1]] = acceleration[[1, -2]]  # the filter distorts the ends
     return FilteredMotion(smooth, velocity, acceleration)
 
 
 def bandwidth_of(log: Log) -> float:
     """Return the bandwidth [Hz] of the motion in a log, without reading across gaps.
 
-    It is the frequency below which the acceleration has 95 % of its power, as far as the position, or the velocity from
-    which it is integrated, stands out of its noise. Raises InputError if it never does.
+    The bandwidth is the frequency below which the acceleration has 95 % of its power, counting only frequencies at
+    which the position (or the integrated velocity) stands out of its noise. Raises InputError if there are none.
     """
     settings = IdentificationSettings.current()
     role, derivatives = ("velocity", 1) if log.is_integrated else ("position", 2)
@@ -134,7 +136,7 @@ def bandwidth_of(log: Log) -> float:
 def directions(position: np.ndarray) -> tuple[bool, bool]:
     """Tell whether a motion [m], shape (n,), goes forward, and whether it goes back.
 
-    Noise counts as neither.
+    Noise does not count as motion.
     """
     settings = IdentificationSettings.current()
     steps = np.diff(
@@ -157,10 +159,10 @@ def inverse_model(
 ) -> InverseModel:
     """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
-    With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
-    distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, taken from the log
-    by default. For a stage on a joint, `cart_share` is the fraction of the mass that moves with the measured cart, on
-    which friction acts.
+    With `by_direction`, viscous and Coulomb friction have a value for each direction; the offset is left out, because a
+    difference of the Coulomb frictions looks alike. `bandwidth` [Hz] is the motion's, taken from the log by default.
+    For a stage on a joint, `cart_share` is the fraction of the mass that moves with the measured cart, on which
+    friction acts.
 
     `averaged` is the number of samples over which the log's force is averaged; the columns are averaged alike. `extra`
     columns by name, shape (n,), are fitted as well, and their part is subtracted from the measured force. Raises
@@ -186,7 +188,7 @@ def inverse_model(
         raise InputError("position", actual, expected, "--as break-away, for force that rises from rest")
     both = all(directions(log["position"]))
     if not both and not by_direction:
-        columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
+        columns[:, 3] = 0.0  # motion in one direction only adds it to Coulomb friction
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     fitted = columns @ solution
     names = _NAMES[by_direction]
@@ -217,7 +219,7 @@ def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _other_sign(log: Log) -> str:
-    """Return the scale that reverses the sign with which the force of a log was read."""
+    """Write the scale with which the force of a log would be read with the opposite sign."""
     scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
     scale = next((match for match in scales if match), None)
     if scale is None:
@@ -245,7 +247,7 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Tell which rows belong to a lasting stretch of slow rows, shape (rows,)."""
+    """Mark the rows, shape (rows,), that belong to a long stretch of slow motion."""
     settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
@@ -269,7 +271,7 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, columns (with the extra ones), forces and positions of a segment, filtered and decimated."""
+    """Return filtered, decimated times, columns, forces and positions of a segment."""
     settings = IdentificationSettings.current()
     if part.stop - part.start < 2 * settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
@@ -309,5 +311,5 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
 
 
 def _first(count: int, step: int) -> int:
-    """Return the first row to keep when rows are thinned, so that the last one is kept too."""
+    """Return the first row to keep when thinning rows, so that the last row is kept too."""
     return (count - 1) % step

@@ -32,7 +32,7 @@ FirstEstimates = Callable[[str, Sequence[Estimate]], object]
 class AnalysisSettings:
     """The user's choices for an analysis; None if friso is to choose.
 
-    `bandwidth` [Hz] is that of moves for the inverse model, `band` [Hz] and `period` [s] are those of frequency
+    `bandwidth` [Hz] is the moves' bandwidth for the inverse model; `band` [Hz] and `period` [s] apply to frequency
     responses. `progress` receives the progress of an analysis, and `tell` the first estimates of a log, by name, which
     a longer analysis then improves.
     """
@@ -51,9 +51,9 @@ NOTHING_CHOSEN = AnalysisSettings()
 class Prior:
     """Prior knowledge of the machine for the analysis of an experiment.
 
-    `stage` is None if there is none. `from_user` tells whether the user gave it, so that its controller is the
-    machine's. `estimates` are results of earlier experiments, by key. `made_up` are the keys of the stage that were
-    made up for a log, because the file lacks their tables.
+    `stage` may be None. `from_user` tells whether the user gave the stage, so that its controller is the machine's.
+    `estimates` are results of earlier experiments, by key. `made_up` are the keys of the stage that were made up for a
+    log, because the file lacks their tables.
     """
 
     stage: Stage | None = None
@@ -136,17 +136,16 @@ class ExperimentKind(Generic[Result]):
     `analyse` returns the result of a group of logs, of a class of the kind's own; `estimates` gives keys of the stage
     file from the result, and `correlated` their correlation. `after` names the kinds whose results it uses.
 
-    `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the last.
-    `si`: they must be in SI units, except the `foreign` ones (a force in volts). `per_unit`: the analysis does not
-    depend on the unit of the force, and results are then per volt. `partial`: tells whether a log shows too little by
-    itself, such as one event; such logs count as one log with gaps. `together`: all logs are realisations of one
-    experiment; `responses`: it also takes frequency responses from another instrument.
+    `roles` are the channels that a log needs; of alternatives separated by |, the first that is mapped, or the last.
+    `si` tells that channels must be in SI units, except for the `foreign` roles (a force in volts). `per_unit` tells
+    that the analysis works in any unit of force, with results such as kg per volt. `partial` tells whether a log shows
+    too little by itself, such as one event; such logs are joined to one log with gaps. `together` tells that all logs
+    are realisations of one experiment; `responses` that frequency responses from another instrument are accepted.
 
-    `claims` returns why a log without a stated kind may be of this one, or None; `claims_together` does so for several
-    logs, whatever each seems to be alone. `around` makes up a stage for a log if none is given. `notes` are remarks on
-    results for the engineer, with or without a stage; `doubts` are sentences against trusting a result, and `failed`
-    tells whether its analysis failed, even if parts of it hold. Functions raise InputError for logs that cannot be
-    used.
+    `claims` returns why a log without a stated kind may be of this kind, or None; `claims_together` does so for several
+    logs together. `around` makes a stage with assumed values for a log if none is given. `notes` are remarks on results
+    for the engineer, with or without a stage; `doubts` are sentences against trusting a result, and `failed` tells
+    whether its analysis failed, even if parts of it hold. Functions raise InputError for logs that cannot be used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.registry import Registry
 
-if TYPE_CHECKING:  # the names are asked for by --help, which shall not take a second
+if TYPE_CHECKING:  # --help lists the names and must be fast
     from friso.identification.kind import ExperimentKind
 
 KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiments", "KIND")
@@ -15,7 +15,7 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
-    """Return the names of a registry so that each comes after those in its `after`, else in alphabetical order."""
+    """Return a registry's names, each after all names in its `after`, else alphabetically."""
     sorter = TopologicalSorter(
         {name: [other for other in registry[name].after if other in registry] for name in registry}
     )

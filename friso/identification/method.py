@@ -39,11 +39,11 @@ class Identification:
     """Result of identification from logs of several experiments.
 
     `stage` has uncertain keys; it is None if no stage was given or could be made up, or nothing was identified.
-    `correlations` are those of its keys, `estimates` the combined ones (one per key), and `warnings` are for the
-    engineer.
+    `correlations` are between the stage's keys, `estimates` are the combined estimates (one per key), and `warnings`
+    are for the engineer.
 
     `doubts` are sentences against trusting the result, and `failed` tells whether an analysis failed, even if parts of
-    it hold. `origins` gives the origin of each key of the stage; `laws`, if asked, the supported friction laws.
+    it hold. `origins` has the origin of each key of the stage; `laws` compares friction laws, if requested.
     """
 
     stage: Stage | None
@@ -75,8 +75,8 @@ def identify(
 ) -> Identification:
     """Identify the stage from logs, each with its kind of experiment.
 
-    `base` is the prior stage, of which some keys may be `made_up` for a log. With a base whose controller is the
-    machine's, moves with a reference are simulated in closed loop. Raises InputError for logs that cannot be used.
+    `base` is the prior stage; `made_up` lists its keys with assumed values. If the base has the machine's own
+    controller, moves with a reference are simulated in closed loop. Raises InputError for logs that cannot be used.
     """
     if base is not None and base.conditions is not None:
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
@@ -158,7 +158,7 @@ def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
 def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:
     """Check before any fit that the logs, each with its kind, can predict the others.
 
-    Raises InputError for a log that none of them can predict.
+    Raises InputError for a log that no given log can predict.
     """
     prior = Prior(base, base is not None)
     predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
@@ -180,9 +180,9 @@ def predict(
 ) -> Prediction:
     """Predict another log of the machine by the first experiment that can.
 
-    Kinds that use the results of others come first. The stage is that of the one experiment, not the combination, so
-    that the errors are those of one record on another. The controller is taken from `base`, or from the log's own
-    set-up. Raises InputError if none can.
+    Kinds that use results of other kinds come first. The prediction uses the one experiment's stage, not the
+    combination, so that errors are from one record to another. The controller is taken from `base`, or from the log's
+    own set-up. Raises InputError if no experiment can.
     """
     prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
@@ -202,7 +202,7 @@ def _unpredictable(log: Log) -> InputError:
 
 
 def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Return the doubts about the results: one by one for a single experiment, otherwise grouped by logs."""
+    """List the doubts about the results, grouped by logs if there are several experiments."""
     doubts_by_log = [KINDS[experiment.kind].doubts(experiment.result) for experiment in experiments]
     if len(experiments) == 1:
         return tuple(doubts_by_log[0])
@@ -211,7 +211,7 @@ def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
-    """Return for each log the keys of its set-up that the stage does not have, in words."""
+    """Write, for each log, which keys of its set-up the stage does not have."""
     several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
         f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
@@ -230,7 +230,7 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
 
 
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
-    """Make up a stage for the first log that determines enough of a machine; None without one."""
+    """Make a stage with assumed values for the first log that suffices; None without one."""
     for log, kind in logs:
         make = KINDS[kind].around
         if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:

@@ -1,4 +1,4 @@
-"""Widen intervals of the whole model by what it lacks, or replace them by those of the inverse model."""
+"""Widen intervals of the whole model by its model error, or replace its estimates by the inverse model's."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from friso.identification.output_error.parameters import BRISTLES, is_free
 from friso.identification.settings import DoubtSettings
 
 NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
-"""Reason why nothing is reported from a fit."""
+"""Reason given where nothing is reported from a fit."""
 
 SPOILT = "what is wrong with the record would pass for it"
-"""Reason why a record with a delay, a filter or a similar fault gives only what the inverse model shows."""
+"""Reason given where a record with a delay, a filter or a similar fault only gives the inverse model's quantities."""
 
 CONTRADICTED = "the whole model contradicts the record"
-"""Reason why a fit is replaced by the inverse model."""
+"""Reason given where a fit is replaced by the inverse model."""
 
 
 def allowed_for(case: KeyCase) -> KeyCase:
     """Return the case with intervals that include the model error and the causes found.
 
-    A fit that describes nothing gives nothing; a fit that contradicts the record is replaced by the inverse model.
-    Effects that the model lacks can pass for bristles: with a load behind a coupling of 40 Hz, and with a force 2 ms
-    early, their stiffness came out at half of the truth, outside an interval twice as wide as the noise allowed.
+    If the fit does not describe the record, nothing is reported; if the fit contradicts the record, the inverse model's
+    estimates replace it. Effects that the model lacks can look like bristles: with a load behind a coupling of 40 Hz,
+    and with a force 2 ms early, the fitted stiffness was half of the true one, outside an interval twice as wide as by
+    noise.
     """
     quality = case.quality
     if quality.failed:
@@ -49,7 +50,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
 
 
 def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
-    """Return the quantity of the inverse model for a key, and the factor from it to the key."""
+    """Map stage-file keys to quantities of the inverse model, with the conversion factor."""
     bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
     total = sum(flat[key] for key in bodies)
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
@@ -65,7 +66,7 @@ def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Return estimates and correlation from the inverse model, for the keys that it determines; others are withheld."""
+    """Return estimates and correlation from the inverse model; other keys are withheld."""
     sources, answers = inverse_sources(flat), []
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
@@ -85,9 +86,10 @@ def with_model_error(
 ) -> Estimate:
     """Return an estimate of the whole model whose interval includes the model error.
 
-    It is extended by its distance from the inverse model's interval, times `lacking`, the fraction of the residual that
-    is not noise. It is no narrower than that interval times `alike`, which is 1 if both models leave equally much:
-    shared errors move both. `scale` is the factor from the inverse model's quantity to the key.
+    The interval is extended by its distance from the inverse model's interval, times `lacking`, the fraction of the
+    residual that is not noise. It is no narrower than the inverse model's interval times `alike`, which is 1 if both
+    models have equal residuals, because shared errors move both. `scale` is the factor from the inverse model's
+    quantity to the key.
     """
     if not (estimate.determined and inverse.determined):
         return estimate
@@ -118,7 +120,7 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Return estimates whose intervals reach to the values of the log corrected for each cause."""
+    """Extend intervals to the values from the log when corrected for each cause."""
     if not case.quality.spoilt:
         return {}
     answers = {}
@@ -132,13 +134,13 @@ def _with_causes(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _imitated_by_causes(case: KeyCase) -> dict[str, str]:
-    """Return, by key, why quantities beyond the inverse model are not reported for a faulty record."""
+    """Return reasons, by key, against reporting non-inverse-model quantities of faulty records."""
     others = case.determined.keys() - inverse_sources(case.flat).keys() if case.quality.spoilt else ()
     return dict.fromkeys(others, SPOILT)
 
 
 def _reaching(case: KeyCase) -> dict[str, Estimate]:
-    """Return estimates with intervals that contain what findings state about quantities of the inverse model."""
+    """Extend intervals to the values that findings state for the inverse model's quantities."""
     answers = {}
     for finding in case.quality.findings:
         for key, (name, scale) in inverse_sources(case.flat).items():
@@ -156,9 +158,9 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """Return a quantity of the inverse model without a cause, and how far it may still move.
+    """Return a quantity of the inverse model corrected for a cause, and its remaining error.
 
-    The residual may have that cause too, at most by as much again.
+    The correction may be incomplete, at most by as much again.
     """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))
@@ -167,7 +169,7 @@ def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Esti
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
     """Return an estimate whose interval also covers another one, and `further`, times `scale`.
 
-    The two differ by a cause that is not decided.
+    Both estimates count, because it is undecided which is right; `further` is in the unit of `other`.
     """
     if not (estimate.determined and other.determined):
         return estimate

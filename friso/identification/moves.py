@@ -32,20 +32,20 @@ from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
 FITTED, REPEATED = 0.8, 0.92
-"""Fractions of the work up to the ends of its parts: the fit, and its repetition on simulated logs; the last part fits
-either direction alone."""
+"""Progress of the analysis at the ends of its steps: the fit, and its repetition on simulated logs. Fits of either
+direction alone are the last step."""
 
 
 @dataclass(frozen=True)
 class IdentifiedMoves:
     """Result of an analysis of moves.
 
-    It has both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name, the estimates
-    by key of the stage file with the `correlation` of the determined ones, the coverage of the motion, the simulated
-    record of the fit and its errors, and `part`, the samples used.
+    Fields are both fits of the inverse model (common and by direction), the output-error `fit`, the profiles of
+    parameters by name, the estimates of stage-file keys with the `correlation` of the determined ones, the coverage of
+    the motion, the simulated record of the fit and its errors, and `part`, the samples used.
 
-    `loop` is the machine's own closed loop, if it was simulated; without it (None) the stage followed the log, and the
-    simulated force is what held it there, which the model does not explain.
+    `loop` is the machine's own closed loop, if it was simulated; if None, the stage followed the log, and the simulated
+    force is the guiding force, which the model does not explain.
     """
 
     log: Log
@@ -65,7 +65,7 @@ class IdentifiedMoves:
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
-        """Return the estimates that the rows of `correlation` belong to."""
+        """Return the estimates in the order of the rows of `correlation`."""
         return tuple(estimate for estimate in self.estimates if estimate.determined)
 
     @property
@@ -87,12 +87,12 @@ def identify_moves(
     progress: Progress = silent,
     tell: FirstEstimates = lambda name, estimates: None,
 ) -> IdentifiedMoves:
-    """Identify mass, friction and whatever else the moves of a log show of a stage.
+    """Identify mass, friction and other keys of a stage from a log of moves.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the logged reference;
     otherwise the model follows the logged position. `bandwidth` [Hz] is the motion's, read from the force by default.
-    If the force is not in newtons, which no machine's loop allows, estimates are per unit of force. The inverse
-    model's estimates are reported as soon as they are known. Raises InputError for a log without position or force.
+    If the force is not in newtons (not allowed with `own_loop`), estimates are per unit of force. The inverse model's
+    estimates are reported as soon as they are known. Raises InputError for a log without position or force.
     """
     settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
@@ -152,10 +152,10 @@ def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """Another log of the same axis, simulated.
+    """A simulation of another log of one axis, with the estimates of the first.
 
-    It has the samples used, the record and its errors; `apart` is the largest deviation of machines drawn from the
-    estimates, relative to the position (infinite if one diverges).
+    Fields are the samples used, the simulated record and its errors; `apart` is the largest deviation among machines
+    drawn from the estimates, relative to the position (infinite if one diverges).
     """
 
     part: slice
@@ -165,9 +165,9 @@ class SimulatedLog:
 
 
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
-    """Simulate another log of the same axis with the estimates.
+    """Simulate another log of an identified axis with its estimates.
 
-    `set_up` are the flat keys of the stage as it was set up for that log, whose controller and changed keys count.
+    `set_up` has the flat keys of the stage as set up for this log, of which the controller and changed keys are used.
     Raises InputError where the machine's own loop is not known.
     """
     if moves.loop is None:
@@ -197,7 +197,7 @@ def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any
 
 
 def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
-    """Check that a log has its roles in SI units, but for the `foreign` ones.
+    """Check that a log has the given roles in SI units, except for the `foreign` roles.
 
     Raises InputError for a role that is missing, or in another unit.
     """
@@ -215,7 +215,7 @@ def _problems(
 ) -> tuple[Problem, Problem | None]:
     """Set up two problems: the stage that follows the log, and the stage in its own loop.
 
-    Both have all parameters of their equations.
+    Both problems have all parameters of their equations.
     """
     settings = IdentificationSettings.current()
     speed = float(
@@ -233,14 +233,14 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """Return the cart's fraction of the mass if the cart is measured and the joint is free, otherwise 0."""
+    """Return the cart's fraction of the mass if it is measured on a free joint, otherwise 0."""
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
-    """Return the values at which the fit starts, from the inverse model as far as it determines them.
+    """Return start values of the fit, from the inverse model as far as it determines them.
 
     The inverse model has one body. Values that cannot be distinguished from 0 start within their interval. A stage on a
     free joint without a measured cart starts at the given values.

@@ -19,23 +19,23 @@ UNKNOWN = (
     "a delay, a filter, a constant force, one that drifts or varies with position, a missing feedforward and a mode in "
     "the band were considered, and none explains it: check --scale, including its sign, and which channel is which"
 )
-"""Advice if no cause is found."""
+"""Clause of a message if no cause of a large residual is found."""
 
 WITHOUT_FRICTION = ". The stage file says that there is no friction: with a table [friction], friction is identified"
-"""Advice if the given structure has no friction."""
+"""Advice added to a message if the stage file has no friction."""
 
 
 @dataclass(frozen=True)
 class Quality:
     """Quality of a fit of moves, with reasons against trusting it.
 
-    `noise` [N] is that of the record's force; `left` [N] the RMS residual where it counts, and `noise_left` the
-    residual of noise alone. `inverse_error` and `whole_error` are relative errors of the force: by the inverse model,
-    and by steady friction and mass of the whole model on the samples of the inverse model. `findings` are the doubts
-    raised. The whole model may be `rejected`, or nothing holds at all (`failed`). The inverse models `without` a cause
-    are of the corrected log. A record is `spoilt` if its fault passes for friction at low speed, and `unsettled` if a
-    large residual has no known cause. A cause is `seen` if the samples themselves show it, as clipping: no effect is
-    named then.
+    `noise` [N] is the noise of the record's force; `left` [N] the RMS residual over counted samples, and `noise_left`
+    [N] the residual expected of noise alone. `inverse_error` and `whole_error` are relative errors of the force: by the
+    inverse model, and by steady friction and mass of the whole model on the samples of the inverse model. `findings`
+    are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). `without` has inverse
+    models of the log corrected for a cause. A record is `spoilt` if its fault passes for friction at low speed, and
+    `unsettled` if a large residual has no known cause. `seen` tells that the samples themselves show a cause, such as
+    clipping; no other effect is named then.
     """
 
     noise: float
@@ -58,7 +58,7 @@ class Quality:
 
     @property
     def ratio(self) -> float:
-        """Return the residual over that of noise alone."""
+        """Return the ratio of the residual to the residual of noise alone."""
         return self.left / self.noise_left if self.noise_left > 0 else np.inf
 
     @property
@@ -68,7 +68,7 @@ class Quality:
 
     @property
     def may_imitate_bristles(self) -> bool:
-        """Tell whether the fit leaves so much that it may have passed for bristles."""
+        """Tell whether the residual is so large that missing effects may look like bristles."""
         return self.ratio > DoubtSettings.current().noise_ratio_of_imitated_bristles
 
     @property
@@ -82,10 +82,11 @@ def quality_of(
 ) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
 
-    If it is `led` by an effect that explains the residual, that effect is named instead of the inverse model's causes.
+    If the fit is `led` by an effect that explains the residual, this effect is named instead of the inverse model's
+    causes.
 
-    The whole model may describe a record that is `beyond` the inverse one, which has no sticking. A cause is no doubt
-    then if the whole model is clearly better than the inverse model without it.
+    The whole model may describe a record that the inverse model, which has no sticking, does not. A cause then raises
+    no doubt if the whole model is clearly better than the inverse model corrected for the cause.
     """
     settings, case = DoubtSettings.current(), RecordCase(log, inverse, cart_share)
     flat, left, passed = fit.stage, fit.left, fit.problem.noise_left(noise)
@@ -125,7 +126,7 @@ def quality_of(
 def _verdict(
     plain: Quality, reasons: list[RaisedDoubt], unit: str, poor: bool, rejected: bool, frictionless: bool
 ) -> str:
-    """Return in a sentence how much the fit leaves unexplained, and why; "" for a complete model."""
+    """Write how much the fit leaves unexplained, and why; "" for a complete model."""
     why = "".join(f"; {cause.words}" for cause in reasons)
     if poor:
         return (
@@ -149,15 +150,16 @@ def _verdict(
 def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray:
     """Return friction [N] of a stage at steady velocities [m/s], without its constant force.
 
-    Both have the shape (n,).
+    Velocities and friction have the shape (n,).
     """
     return _by_direction(flat, np.abs(velocity), np.sign(velocity))
 
 
 def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
-    """Return the relative force error of a stage's mass and steady friction, on the samples of the inverse model.
+    """Return the relative force error of a stage's mass and steady friction.
 
-    Dry friction changes sign as gradually as the filtered direction in the inverse model.
+    The error is taken on the samples of the inverse model. Dry friction changes sign as gradually as the inverse
+    model's filtered direction.
     """
     mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
     acceleration, velocity, sign, _ = inverse.columns.T
@@ -170,9 +172,9 @@ def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
 def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
     """Return friction [N] at speeds [m/s] in directions from -1 to 1, each of shape (n,).
 
-    It changes gradually from one direction to the other; the constant force is left out.
+    Friction changes gradually from one direction to the other; the constant force is left out.
     """
-    from friso.frequency.friction import steady_force  # brings SymPy along
+    from friso.frequency.friction import steady_force  # imports SymPy, which is slow
 
     forward, backward = (steady_force(flat, speed, forwards) for forwards in (True, False))
     constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)

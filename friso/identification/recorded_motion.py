@@ -23,7 +23,7 @@ FILE, REFERENCE, TIME, UNIT, SAMPLE_TIME, SCALE, BETWEEN = (
 )
 
 RecordedSamples = tuple[np.ndarray, np.ndarray]
-"""Instants [s] from 0 on, and the reference there [m] from 0 on."""
+"""Sample times [s] and reference [m], both beginning at 0."""
 
 
 @register_motion
@@ -35,21 +35,21 @@ class Recorded(Motion):
 
     kind: Literal["recorded"]
     file: str
-    """Beside the stage file, or by its full path."""
+    """Path of the file with the reference, relative to the stage file or absolute."""
     reference: str | None = None
-    """Name of its channel; default: the one whose name tells that it is a reference, or the only one."""
+    """Name of the reference's channel; by default the one named like a reference, or the only channel."""
     time: str | None = None
-    """Name of the channel of instants; default: the one whose name tells it, or the times of the file."""
+    """Name of the channel of sample times; by default the one named like a time, or the file's own times."""
     unit: str | None = None
-    """Unit of the reference in the file, where that states none or a wrong one."""
+    """Unit of the reference, for a file that states no unit or a wrong one."""
     sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
-    """Time between samples of a file that states none."""
+    """Time between samples, for a file that states no times."""
     scale: Annotated[float, Number(any_sign, "0.5")] = 1.0
-    """By what the recorded reference is multiplied."""
+    """Factor on the recorded reference."""
     between: Literal["linear", "hold"] = "linear"
     """Whether the reference is linear between samples, or held from each to the next."""
     duration: Annotated[Value | None, Quantity("s", positive, "20 s")] = None
-    """Default: of the record."""
+    """Duration of the motion; by default the record's."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -67,7 +67,7 @@ class Recorded(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return a piece from each sample to the next; the last one stands."""
+        """Return the reference as one polynomial from each sample to the next; it stands at the end."""
         times, values = _samples(flat)
         scale = flat[SCALE]
         slopes = np.append(np.diff(values) / np.diff(times), 0.0) * (flat[BETWEEN] == "linear")
@@ -75,12 +75,12 @@ class Recorded(Motion):
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return the distance between the outermost places of the reference [m]."""
+        """Return the distance [m] between the highest and lowest position of the reference."""
         return np.abs(flat[SCALE]) * np.ptp(_samples(flat)[1])
 
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the duration of the record."""
+        """Return the record's duration as the default of `duration`."""
         return {} if DURATION in flat else {DURATION: _samples(flat)[0][-1]}
 
 
@@ -100,7 +100,7 @@ def _samples(flat: Mapping[str, Any]) -> RecordedSamples:
 def _read(
     path: Path, changed: int, size: int, names: tuple[str | None, ...], sample_time: float | None, axis: str
 ) -> RecordedSamples:
-    """Read the samples of a record, once for each state of its file."""
+    """Read the samples of a record, cached until its file changes."""
     try:
         times, values = _signals(path, names, sample_time, axis)
         _check(times, values)
@@ -110,7 +110,7 @@ def _read(
 
 
 def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | None, axis: str) -> RecordedSamples:
-    """Return instants [s] and reference [m] as they stand in a file. Raises LogError."""
+    """Return sample times [s] and reference [m] as stored in a file. Raises LogError."""
     from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps
     from friso.identification.logs.mapping import Mapping as Told
@@ -134,12 +134,12 @@ def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | Non
     choice, notes = proposal.chosen["reference"], Notes()
     values = signal(choice, reading, notes)
     times = instants(choice, proposal.chosen.get("time"), reading, notes)
-    assert times is not None  # check_gaps has seen that there are some
+    assert times is not None  # check_gaps has made sure that times exist
     return times, values
 
 
 def _check(times: np.ndarray, values: np.ndarray) -> None:
-    """Check that a record is whole. Raises InputError."""
+    """Check that a record has finite, increasing times and values. Raises InputError."""
     from friso.identification.logs.time_base import gaps
 
     if times.size < 2:
@@ -160,7 +160,7 @@ def _check(times: np.ndarray, values: np.ndarray) -> None:
 
 
 def _in_keys(example: str) -> str:
-    """Return the options of an example for logs as keys of [motion]."""
+    """Rewrite command-line options of a log, in an example, as keys of [motion]."""
     words = shlex.split(example)
     keys = []
     for option, value in zip(words[::2], words[1::2], strict=False):

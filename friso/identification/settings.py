@@ -12,67 +12,67 @@ class DoubtSettings(Settings):
     """Settings of doubts about logs: when one is raised, and how far its consequences reach."""
 
     error_share_of_a_cause: float = setting(0.7, "")
-    """Largest ratio of errors with and without a cause that counts. Nearer 1, chance finds some."""
+    """Largest ratio of model errors with and without a cause for the cause to count. Nearer 1, chance finds causes."""
 
     error_ratio_of_rival_causes: float = setting(1.5, "")
-    """Ratio of errors up to which causes count beside the best one."""
+    """Largest ratio of a cause's error to the best cause's error for both to count."""
 
     motion_periods_of_a_shift: float = setting(0.25, "")
     """Longest shift of the force searched, in periods of the motion's bandwidth. Beyond it a sign would turn."""
 
     motion_periods_of_an_average: float = setting(1.0, "")
-    """Longest average searched, in periods of the motion's bandwidth. Longer ones leave no motion."""
+    """Longest average searched, in periods of the motion's bandwidth. Longer averages leave no motion."""
 
     places_of_a_force: int = setting(40, "")
-    """Places along the way with a separate force. Fewer miss cogging; more take longer."""
+    """Number of places along the way with a separate force. Fewer miss cogging; more take longer."""
 
     rows_for_each_place: int = setting(20, "")
-    """Fewest rows of the inverse model for each such place. With fewer a place fits noise."""
+    """Fewest rows of the inverse model for each place with a separate force. With fewer, a place fits noise."""
 
     samples_of_a_reference: int = setting(20, "")
-    """Fewest samples of a segment for the motion of its reference, which the filter needs."""
+    """Fewest samples of a segment from which the filter can compute the reference's motion."""
 
     speed_share_of_a_fast_stage: float = setting(0.1, "")
-    """Speed from which a missing feedforward has to show, relative to the highest. Of 400 drawn logs without a missing
-    one, one was reported, 98 if all speeds counted; of 186 with a missing one, 130, and 174."""
+    """Speed above which a missing feedforward must show, relative to the highest. Of 400 drawn sound logs, 1 was
+    reported (98 if all speeds counted); of 186 logs without their feedforward, 130 were (174)."""
 
     power_share_of_an_oscillation: float = setting(0.5, "")
     """Fraction of the residual's power in one peak that counts as an oscillation."""
 
     samples_of_a_spectrum: int = setting(256, "")
-    """Samples of each piece of the residual for its spectrum. Longer ones resolve more and scatter more."""
+    """Number of samples in each piece of the residual for its spectrum. Longer pieces resolve more and scatter more."""
 
     share_of_a_whole_record: float = setting(0.2, "")
-    """Longest stretch of a record, relative to the whole, up to which gaps are reported."""
+    """Length of the longest stretch without gaps below which gaps are reported, relative to the record."""
 
     digits_of_a_fine_position: float = setting(500.0, "")
-    """Travel in steps of the position from which its resolution is fine."""
+    """Smallest travel at which the resolution of the position is fine, in steps of the position."""
 
     force_share_of_a_constant_force: float = setting(0.1, "")
-    """Smallest constant force that is reported beside friction, over the force's standard deviation."""
+    """Smallest constant force that is reported beside friction, relative to the force's standard deviation."""
 
     force_share_of_no_friction: float = setting(1e-3, "")
-    """Coulomb friction below which it is impossible, over the force's standard deviation."""
+    """Smallest possible Coulomb friction, relative to the force's standard deviation."""
 
     deviations_of_differing_halves: float = setting(3.29, "")
-    """Standard deviations by which the halves of a record differ by chance once in a thousand times."""
+    """Standard deviations by which the halves of a sound record differ once in a thousand times."""
 
     noise_ratio_of_a_lacking_model: float = setting(5.0, "")
-    """Ratio of residual to noise above which a fit lacks something: at most 2.6 on 12 drawn sound logs, 8 on two with
-    play that no effect explained."""
+    """Ratio of residual to noise above which the model lacks something. It was at most 2.6 on 12 drawn sound logs, and
+    8 on two logs with play."""
 
     noise_ratio_of_imitated_bristles: float = setting(3.0, "")
-    """Ratio of residual to noise above which what the model lacks may pass for bristles. With play, a log that left 8
-    times the noise had bristles of 31 to 96 kN/m for 262."""
+    """Ratio of residual to noise above which missing effects may look like bristles. With play, a fit that left 8 times
+    the noise gave 31 to 96 kN/m instead of 262 kN/m."""
 
     error_of_a_poor_model: float = setting(0.3, "")
     """Relative error of the force above which a model does not describe the record."""
 
     error_of_an_unsettled_record: float = setting(0.1, "")
-    """Residual of a fit and of the best cause, over the force, above which intervals widen."""
+    """Residual, relative to the force, of both the fit and the best cause above which intervals are widened."""
 
     error_share_of_a_clearly_better_model: float = setting(0.5, "")
-    """Ratio of errors below which a whole model needs no cause."""
+    """Ratio of the whole model's error to the best cause's error below which no cause is named."""
 
     error_ratio_of_a_contradiction: float = setting(1.5, "")
     """Ratio of the whole model's error to the inverse model's above which it contradicts the log."""
@@ -81,96 +81,96 @@ class DoubtSettings(Settings):
     """Relative error of the force below which a whole model contradicts nothing."""
 
     widening_where_much_is_left: float = setting(2.0, "")
-    """Factor on intervals with a large unexplained residual, and on those of slow friction with any. Without it,
+    """Factor on intervals if a large residual is unexplained, and on intervals of slow friction if any is. Without it,
     intervals missed the truth by up to 1.8 half-widths on known machines with filtered signals."""
 
     sample_share_of_a_direction: float = setting(0.2, "")
-    """Fewest counted samples in one direction for a separate fit, over all."""
+    """Smallest fraction of the counted samples in one direction for a separate fit."""
 
     cost_share_of_either_direction: float = setting(0.5, "")
-    """Largest squares of separate fits over the common one if friction differs by direction (friso's choice)."""
+    """Largest ratio of the sums of squares of separate and common fits that shows friction differing by direction."""
 
     bandwidths_of_a_coupling: float = setting(2.0, "")
-    """Cut-off of the motion in bandwidths, well below the coupling. For 3 kg with a third behind 40 Hz, a mass 1.3 %
-    too large becomes right at 2 and 3, and by half at 5."""
+    """Cut-off of the motion in tests for a coupling, relative to its bandwidth. For 3 kg with a third behind 40 Hz, 2
+    and 3 correct a mass 1.3 % too large; 5 corrects half of the error."""
 
     mass_share_of_a_tried_coupling: float = setting(0.05, "")
-    """Force of a tried coupling over inertia. Larger ones are not linear."""
+    """Force of a tried coupling, relative to inertia. Larger forces are not linear."""
 
     share_of_a_tried_load: float = setting(0.02, "")
-    """Tried friction in proportion to the motor's force, over that force."""
+    """Size of tried load-dependent friction, relative to the motor's force."""
 
     shares_of_a_load: tuple[float, ...] = setting((0.02, 0.5), "")
-    """Least and largest ratio of such friction to the motor's force. It was below 0.009 on sound logs, and from a half
-    on a transmission locks itself."""
+    """Smallest and largest plausible ratio of load-dependent friction to the motor's force. It was below 0.009 on sound
+    logs; above 0.5 a transmission locks itself."""
 
     power_left_by_a_load: float = setting(0.7, "")
-    """Largest fraction of the residual's power that such friction leaves: 0.02 to 0.26 on drawn logs with a tenth of
-    it, 0.92 and more on sound ones."""
+    """Largest fraction of the residual's power left by load-dependent friction if it is named. It was 0.02 to 0.26 on
+    drawn logs with a ratio of 0.1, and at least 0.92 on sound logs."""
 
     friction_share_of_a_digit: float = setting(0.1, "")
-    """Resolution of the force over Coulomb friction above which it is coarse."""
+    """Resolution of the force above which it is coarse, relative to Coulomb friction."""
 
     power_left_by_an_effect: float = setting(0.85, "")
-    """Largest fraction of the residual's power that an effect leaves if it is named. Of 45 drawn logs with effects of a
-    tenth of the friction and more the right one left 0.01 to 0.84; on sound ones none explained anything."""
+    """Largest fraction of the residual's power that an effect leaves if it is named. On 45 drawn logs with effects of a
+    tenth of the friction and more, the right effect left 0.01 to 0.84; on sound logs no effect explained anything."""
 
     reach_of_an_effect: float = setting(2.0, "")
     """Factor by which intervals exceed the shift of the fit by an effect. One linear step recovered at most 60 % of an
     error of 1.5 % by a coupling, and half (in the logarithm) of the damping that three samples of delay doubled."""
 
     places_of_a_force_along: int = setting(12, "")
-    """Places along the way with a separate force or friction, each of which takes a simulated run."""
+    """Number of places along the way with a separate force or friction; each takes a simulated run."""
 
     travels_of_a_pitch: tuple[float, ...] = setting((2.0, 60.0), "")
     """Least and largest number of cogging periods along the travel that are tried."""
 
     pitches_for_each_travel: int = setting(4, "")
-    """Pitches that are tried for each further period along the travel. Between two of them the phase slips by a quarter
+    """Number of pitches tried per additional period along the travel. Between two of them the phase slips by a quarter
     turn."""
 
     plays_tried: tuple[float, ...] = setting((8e-6, 1e-3), "m")
-    """Least and largest width of play that is tried. A narrower one passes within a few samples; a wider one is
+    """Smallest and largest width of play that is tried. Narrower play passes within a few samples; wider play is
     obvious."""
 
     ratio_of_plays: float = setting(1.4, "")
-    """Ratio of successive widths that are tried. At 1.5 times its width a play explains half of it."""
+    """Ratio of successive tried widths of play. A width wrong by a factor of 1.5 explains half of the effect."""
 
     force_share_of_a_told_effect: float = setting(0.01, "")
-    """Share of the force's standard deviation below which a force along the way widens intervals without a sentence:
-    of sound logs at 500 Hz 0.004 was seen, and a tenth of the friction is 0.02 and more."""
+    """Fraction of the force's standard deviation below which a force along the way only widens intervals, unnamed.
+    Sound logs at 500 Hz showed 0.004; a tenth of the friction is at least 0.02."""
 
     samples_of_a_crossing: float = setting(5.0, "")
-    """Samples in which a load crosses a play that is tried, on average: of a sound sine at 500 Hz, reversals passed for
-    one that took 2 samples; with 10, plays of 20 um would be missed at 1 kHz."""
+    """Fewest samples, on average, in which a load crosses a tried play. With 2, reversals of a sound sine at 500 Hz
+    looked like play; with 10, plays of 20 um would be missed at 1 kHz."""
 
     bandwidths_of_a_play: float = setting(4.0, "")
-    """Bandwidth of the motion for play, over the usual one. At 1 a gap that is crossed in 5 ms is blurred; at 16 noise
-    counts."""
+    """Bandwidth of the motion in tests for play, relative to the usual bandwidth. At 1 a gap that is crossed in 5 ms is
+    blurred; at 16 noise dominates."""
 
     power_share_of_a_drift: float = setting(0.5, "")
-    """Largest residual with a changing delay over that with a constant one: 0.02 to 0.25 on drawn logs."""
+    """Largest ratio of residuals with a changing and a constant delay. It was 0.02 to 0.25 on drawn logs."""
 
     mass_share_of_a_tried_play: float = setting(0.05, "")
     """Tried loose fraction of the mass. Play acts in proportion to it."""
 
     mass_share_of_a_loose_load: float = setting(0.5, "")
-    """Assumed mass of a loose load with friction, over the whole, by which it slows down."""
+    """Assumed mass of a loose load that friction slows down, relative to the total mass."""
 
     most_of_a_play: float = setting(1.5, "")
-    """Fraction of mass or friction up to which a play is plausible. More than all is another effect."""
+    """Largest plausible fitted fraction of mass or friction behind a play. Much more than 1 shows another effect."""
 
     mass_share_of_a_play: float = setting(0.03, "")
-    """Loose fraction of the mass from which play is reported."""
+    """Smallest loose fraction of the mass for which play is reported."""
 
     bandwidths_of_a_delayed_force: float = setting(10.0, "")
-    """Cut-off of the force in bandwidths of the motion, above which its derivative is noise."""
+    """Cut-off of the force for its derivative, in bandwidths of the motion. Beyond it the derivative is noise."""
 
     samples_of_a_tried_delay: float = setting(0.05, "")
-    """Tried delay in samples. Larger ones are followed in jumps."""
+    """Tried delay, in samples. Larger delays act on break-aways in jumps."""
 
     samples_of_a_delay: float = setting(0.25, "")
-    """Smallest delay in samples that is reported. Shorter ones are within the hold of the force."""
+    """Smallest reported delay, in samples. Shorter delays may come from holding the force between samples."""
 
     bandwidths_of_a_controller: float = setting(3.0, "")
     """Cut-off of error and force in bandwidths of the motion, above which the derivative of the error is noise."""
@@ -179,21 +179,22 @@ class DoubtSettings(Settings):
     """Fewest rows for each gain in either part of a record. With fewer a gain fits noise."""
 
     shares_of_a_part: tuple[float, ...] = setting((0.1, 0.9), "")
-    """Range of a record, from 0 to 1, within which gains may change. A shorter part shows too little."""
+    """Range of the fractions of a record between which gains may change. Shorter parts show too little."""
 
     levels_of_a_part: int = setting(17, "")
-    """Instants, speeds and places at which gains may change. Between two of them a twentieth is in the wrong part."""
+    """Number of instants, speeds and places at which gains may change. Between two of them, a twentieth of the record
+    is in the wrong part."""
 
     power_left_by_changing_gains: float = setting(0.3, "")
-    """Largest residual's power with two controllers over that with one. Of 150 drawn machines with gains 0.4 to 0.7
-    times as large in a part 149 were reported, of 100 sound ones and 100 with a limited force none."""
+    """Largest ratio of the residual's power with two controllers and one. Of 150 drawn machines with gains reduced to
+    0.4 to 0.7 in a part, 149 were reported; of 100 sound ones and 100 with a limited force, none."""
 
     deviations_at_a_limit: float = setting(6.0, "")
     """Distance below the largest force at which no limit acts, in standard deviations of the noise."""
 
     likeness_of_a_law: float = setting(0.8, "")
-    """Least correlation of the force with the law of the other part: 0.88 and more on drawn machines with other gains,
-    0.02 to 0.1 on a stage that hunts."""
+    """Smallest correlation of the force with the control law of the other part. It was at least 0.88 on drawn machines
+    with changed gains, and 0.02 to 0.1 on a hunting stage."""
 
     logarithm_of_a_gain: float = setting(0.1, "")
     """Smallest change of the gains that is reported, as a logarithm. Drifting clocks change the law by less."""
@@ -202,16 +203,17 @@ class DoubtSettings(Settings):
     """Speed up to which friction has no direction, relative to the highest."""
 
     friction_share_of_a_tried_force: float = setting(0.05, "")
-    """Tried force over Coulomb friction."""
+    """Size of a tried force, relative to Coulomb friction."""
 
     friction_share_of_a_change: float = setting(0.1, "")
-    """Smallest change that is reported, over Coulomb friction."""
+    """Smallest reported change of friction or constant force, relative to Coulomb friction."""
 
     speeds_of_a_start: int = setting(50, "")
-    """Speeds at which the curve of a fit is evaluated, up to that of a body that has begun to move."""
+    """Number of speeds at which a fitted friction curve is evaluated, up to the speed of a body that just began to
+    move."""
 
     stribeck_velocities_of_sliding: float = setting(2.0, "")
-    """Speed in Stribeck velocities at which 2 % of the Stribeck effect is left, for the exponent 2."""
+    """Speed, in Stribeck velocities, at which 2 % of the Stribeck effect is left (exponent 2)."""
 
 
 @dataclass(frozen=True)
@@ -220,17 +222,18 @@ class IdentificationSettings(Settings):
 
     # Estimates of several experiments.
     chance_of_agreement: float = setting(0.01, "")
-    """Probability below which a scatter is a disagreement."""
+    """Probability (chi-square) below which the scatter of estimates counts as disagreement."""
 
-    # What a file holds, shown before it is identified.
+    # Contents of a file, shown before identification.
     bins_of_a_small_plot: int = setting(24, "")
-    """Parts of a channel whose means make its small plot."""
+    """Number of parts of a channel whose means make its small plot."""
 
     # Residuals over place and speed.
     bins_of_a_residual: int = setting(40, "")
-    """Places and speeds in which the mean residual is taken. Fewer hide cogging; more contain noise."""
+    """Number of bins of place, and of speed, in which the mean residual is taken. Fewer hide cogging; more contain
+    noise."""
 
-    # The inverse model: filters, decimation, and what of a motion counts.
+    # The inverse model: filters, decimation, and the parts of a motion that count.
     smoothing_bandwidths: float = setting(5.0, "")
     """Cut-off of the position in bandwidths of the motion (Gautier, Janot, Vandanjon 2013)."""
 
@@ -238,7 +241,7 @@ class IdentificationSettings(Settings):
     """Cut-off of the decimation in bandwidths of the motion (Gautier, Janot, Vandanjon 2013)."""
 
     decimation_pass: float = setting(0.8, "")
-    """Passband of the decimation over half the new sampling frequency. Nearer 1 it aliases."""
+    """Passband of the decimation filter, relative to half the new sampling frequency. Nearer 1 it aliases."""
 
     order_of_smoothing: int = setting(4, "")
     """Order of the Butterworth filter of the position (Gautier, Janot, Vandanjon 2013)."""
@@ -247,25 +250,26 @@ class IdentificationSettings(Settings):
     """Order of the Chebyshev filter before decimation."""
 
     ripple_of_decimation: float = setting(0.05, "dB")
-    """Ripple of that filter, common to the force and to all columns."""
+    """Ripple of the Chebyshev filter before decimation, common to the force and all columns."""
 
     sampling_of_splines: float = setting(0.15, "")
-    """Cut-off times sample time from which splines take derivatives. Differences lose 1 % of the acceleration."""
+    """Cut-off times sample time above which splines give derivatives. Differences would lose 1 % of the
+    acceleration."""
 
     samples_of_an_edge: int = setting(49, "")
-    """Samples left out at the start, where the filters settle."""
+    """Number of samples left out at the start of a record, where the filters settle."""
 
     power_share_of_the_motion: float = setting(0.95, "")
     """Fraction of the acceleration's power within the bandwidth. Nearer 1 noise determines it."""
 
     power_above_noise: float = setting(4.0, "")
-    """Ratio of the position's spectrum to its noise where it counts."""
+    """Smallest ratio of the position's spectrum to its noise at frequencies that count."""
 
     pieces_of_a_spectrum: int = setting(8, "")
-    """Pieces into which a record is cut for its spectrum (Welch). More scatter less and resolve less."""
+    """Number of pieces into which a record is cut for its spectrum (Welch). More scatter less and resolve less."""
 
     way_share_of_a_direction: float = setting(0.02, "")
-    """Least part of the way in one direction for friction to be separated from a constant force."""
+    """Smallest fraction of the way in either direction for separating friction from a constant force."""
 
     deviations_of_standing_still: float = setting(20.0, "")
     """Largest motion at standstill, in standard deviations of the position's noise."""
@@ -277,23 +281,23 @@ class IdentificationSettings(Settings):
     """Shortest rest that is left out, because the controller determines friction at rest."""
 
     rows_of_an_inverse_model: int = setting(20, "")
-    """Fewest rows of an inverse model. Fewer leave four numbers without an interval."""
+    """Fewest rows of an inverse model. With fewer, its four coefficients have no interval."""
 
-    # How uncertain a fit is whose errors are alike.
+    # Uncertainty of a fit with correlated errors.
     row_share_of_likeness: float = setting(0.1, "")
-    """Largest distance of correlated rows, over all rows."""
+    """Largest distance of correlated rows, relative to the number of rows."""
 
     blocks_of_time: int = setting(10, "")
-    """Blocks of time in which errors may be correlated."""
+    """Number of blocks of time within which errors may be correlated."""
 
     bins_of_place_and_speed: int = setting(20, "")
-    """Bins of place and of speed in which errors may be correlated. More contain too few rows."""
+    """Number of bins of place, and of speed, within which errors may be correlated. More contain too few rows."""
 
     least_freedom_of_groups: float = setting(3.0, "")
-    """Fewest degrees of freedom, because some groups are always correlated (friso's choice)."""
+    """Smallest number of degrees of freedom of correlated groups that is assumed (friso's choice)."""
 
     eigenvalue_of_likeness: float = setting(1e-6, "")
-    """Ratio of eigenvalues below which columns count as one."""
+    """Ratio of an eigenvalue to the largest, below which columns cannot be distinguished."""
 
     # The stage file that is written.
     bend_of_made_up_bristles: float = setting(5e-6, "m")
@@ -303,11 +307,11 @@ class IdentificationSettings(Settings):
     """Stribeck velocity of a stage made up for a log (friso's choice)."""
 
     digits_of_an_uncertainty: int = setting(2, "")
-    """Significant digits of an uncertainty, and so of its value."""
+    """Number of significant digits of an uncertainty, which also sets the digits of the value."""
 
-    # Which estimates the keys of a stage file can take.
+    # Estimates that the keys of a stage file can take.
     share_of_a_least_value: float = setting(1e-3, "")
-    """Lower end of a range that would contain 0, over its upper end."""
+    """Lower end of a range that would otherwise reach 0, relative to its upper end."""
 
 
 @dataclass(frozen=True)
@@ -317,93 +321,96 @@ class ExperimentSettings(Settings):
     hysteresis_of_swings: float = setting(0.3, "of half the swing")
     """Hysteresis in counting swings. With less, noise counts as hunting; with more, lopsided cycles are missed."""
 
-    # Excitations and moves, told apart by what repeats.
+    # Excitations and moves, distinguished by what repeats.
 
     # Moves.
     harmonics_of_an_excitation: float = setting(7.0, "")
-    """Harmonics from which a log is an excitation. Moves have 1 to 7, a multisine of 8 equal lines more."""
+    """Effective number of harmonics above which a log is a broad-band excitation. Moves have 1 to 7."""
 
     rests_of_moves: float = setting(0.1, "")
-    """Fraction of time at rest from which a repetition consists of moves."""
+    """Fraction of time at rest above which a repeating log consists of moves."""
 
     samples_of_moves: int = setting(40_000, "")
-    """Most samples of moves that are used (friso's choice)."""
+    """Largest number of samples of moves that are used (friso's choice)."""
 
     # Small motion before sliding.
     low_pass_of_a_check: float = setting(0.7, "")
-    """Low-pass of the second fit, which checks the first, over that of the first."""
+    """Ratio of the low-pass frequencies of the second fit, a check, and the first fit."""
 
     low_pass_of_the_motion: float = setting(5.0, "")
-    """Low-pass of the motion over that of the fit. Friction depends on faster motion than is fitted."""
+    """Ratio of the low-pass frequencies of motion and fit in pre-sliding. Friction depends on faster motion than is
+    fitted."""
 
     samples_of_a_presliding_period: int = setting(40, "")
-    """Samples per period of the low-pass. More take longer and show no more."""
+    """Number of samples per period of the low-pass in pre-sliding. More take longer and show no more."""
 
     samples_of_presliding: int = setting(1000, "")
-    """Fewest samples of a record. Fewer leave a useless interval."""
+    """Fewest samples of a record of pre-sliding. With fewer, the interval is useless."""
 
     bending_range: tuple[float, ...] = setting((1e-6, 5.0), "")
-    """Range of the bristles' bending over that of the motion, from a straight line to immediate slip."""
+    """Range of the bristles' bending parameter in a fit, relative to the motion: from a straight line to immediate
+    slip."""
 
     stiffness_ratio_of_a_joint: float = setting(3.0, "")
-    """Ratio to the joint's stiffness up to which a stiffness may be the joint's."""
+    """Largest ratio of a measured stiffness to the stage file's joint stiffness for it to be the joint's."""
 
     # Slow sliding.
     low_pass_below_a_mode: float = setting(1 / 3, "")
-    """Highest low-pass over the frequency of the structural mode, which the model lacks."""
+    """Highest low-pass frequency, relative to the structural mode, which the model lacks."""
 
     low_pass_of_sliding: float = setting(8.0, "")
-    """Low-pass of the motion over that of the fit. Slips are faster than what is fitted."""
+    """Ratio of the low-pass frequencies of motion and fit in slow sliding. Slips are faster than the fitted force."""
 
     samples_of_slow_sliding: int = setting(60_000, "")
-    """Most samples that are used. More take longer and show no more."""
+    """Largest number of samples of slow sliding that are used. More take longer and show no more."""
 
     fewest_samples_of_sliding: int = setting(2000, "")
-    """Fewest samples. Fewer leave a useless interval."""
+    """Fewest samples of slow sliding. With fewer, the interval is useless."""
 
     stribeck_starts: tuple[float, ...] = setting((0.2, 0.5), "")
-    """Stribeck velocities, over the RMS velocity, from which the fit starts. One alone may miss."""
+    """Stribeck velocities from which fits start, relative to the RMS velocity. One start alone may miss the best
+    fit."""
 
     sliding_bounds: tuple[float, ...] = setting((0.01, 10.0), "")
-    """Bounds of the fitted numbers, over RMS velocity and mean friction."""
+    """Bounds of the fitted numbers of slow sliding, relative to RMS velocity and mean friction."""
 
     tolerance_of_sliding: float = setting(1e-6, "")
-    """Relative change of squares and numbers that ends the fit, far within any interval."""
+    """Relative change of squares and parameters that ends a fit of slow sliding, far within any interval."""
 
     step_of_sliding: float = setting(1e-3, "")
-    """Relative step for derivatives. Smaller ones drown in the tolerance of the runs."""
+    """Relative step for finite differences in slow sliding. Smaller steps drown in rounding errors."""
 
     stribeck_velocities_gone: float = setting(1.5, "")
-    """Speed in Stribeck velocities that the motion must reach. At 1.5 a tenth of the fall is left."""
+    """Speed that slow sliding must reach, in Stribeck velocities. At 1.5 a tenth of the fall of friction is left."""
 
     # Position steps with the cart fixed.
     low_pass_of_steps: float = setting(25.0, "Hz")
     """Low-pass of the force of position steps (thesis, Sec. 4.2.2)."""
 
     drift_of_a_settled_force: float = setting(0.02, "")
-    """Largest drift of the force in a settled window, over a step, beyond that by deflection."""
+    """Largest drift of the force in a settled window beyond the deflection's share, relative to a step."""
 
     drift_of_a_settled_place: float = setting(0.1, "")
-    """Largest drift of the deflection, over a step, if none drifts less. Slow integrators take long."""
+    """Largest drift of the deflection in a settled window if no window drifts less, relative to a step."""
 
     travel_of_a_fixed_cart: float = setting(0.02, "")
-    """Largest motion of a fixed cart, over the position's steps."""
+    """Largest motion of a fixed cart, relative to the position's steps."""
 
     # Slow motion that sticks and slips.
     low_pass_of_stick_slip: float = setting(100.0, "Hz")
-    """Low-pass of deflection and velocity: slips are slower than this."""
+    """Low-pass of deflection and velocity in stick-slip motion, faster than any slip."""
 
     share_of_held_slips: float = setting(0.5, "")
-    """Fraction of slips without a rising force from which none shows static friction."""
+    """Fraction of slips without a rising force above which the log does not show static friction."""
 
     share_near_a_peak: float = setting(0.01, "")
-    """Distance from its peak within which the force is near it, relative to the peak."""
+    """Distance below its peak within which the force counts as near the peak, relative to the peak."""
 
     duration_near_a_peak: float = setting(4.0, "")
-    """Time near the peak, over the usual one, from which a force had stopped rising."""
+    """Time near the peak above which a force had stopped rising, relative to the usual time."""
 
     stroke_share_at_a_stop: float = setting(0.05, "")
     """Distance from the stroke at which the limiter counts as touched, relative to the stroke."""
 
     stiffness_share_of_a_limiter: float = setting(0.1, "")
-    """Largest stiffness of a joint, over that of its limiter."""
+    """Largest stiffness of a joint, relative to its limiter's stiffness."""

@@ -20,15 +20,15 @@ from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
 
 MOVED = ("position", "force")
-"""Roles from which the kind of an experiment is recognised."""
+"""Roles of channels from which the kind of experiment is recognised."""
 
 
 @dataclass(frozen=True)
 class LogFile:
     """A log file: its content, its kind of experiment, and the reason for that kind.
 
-    `mapping` is how it was read, and `mapping_file` stores that (None: it is not stored). `earlier` is the part of the
-    mapping taken from that file, `replaced` the part of the file that the user overrode.
+    `mapping` tells how the log was read, and `mapping_file` is the file that stores it (None: not stored). `earlier` is
+    the part of the mapping read from this file, `replaced` the part that the user overrode.
     """
 
     path: Path
@@ -69,9 +69,9 @@ def read_usable(
 ) -> tuple[list[LogFile], list[InputError]]:
     """Read the files, and leave out unusable ones as long as one can be used.
 
-    Returns the files and the errors of those left out. Of several files, and of `others` that are read beside them,
-    each takes what the options say about its own channels. Raises OpenQuestions for everything that is missing, and
-    InputError if no file can be used.
+    Returns the files and the errors of those left out. Each file, including `others` read besides, uses the options
+    about its own channels only. Raises OpenQuestions for everything that is missing, and InputError if no file can be
+    used.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
@@ -99,19 +99,19 @@ def read_usable(
 
 
 def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
-    """Return an error about a log, with what was kept of how to read it: that may be wrong."""
+    """Add to an error about a log that its stored mapping may be the cause."""
     try:
         kept = "" if is_frequency_response(path) else (load_mapping(path, folder) or Mapping()).beside(options).words
     except InputError:
-        kept = ""  # the error says so
+        kept = ""  # the error itself says so
     actual = f"{error.actual} (read as kept in {sidecar(path).name}: {kept}; options override it)"
     return LogError(error.key, actual if kept else error.actual, error.expected, error.example, error.origin)
 
 
 def _asked_once(alike: Sequence[GapsError]) -> list[LogError]:
-    """Return what is open about logs with the same channels, once, as most of them would have it.
+    """Return open questions about logs with equal channels once, as most logs suggest them.
 
-    A log that moves little may suggest other channels for a role than the rest, and options hold for all.
+    A log with little motion may suggest other channels than the rest, but options hold for all logs.
     """
     votes = Counter(tuple(text for text in error.options if text.startswith("--map")) for error in alike)
     maps = votes.most_common(1)[0][0]
@@ -127,7 +127,7 @@ def _asked_once(alike: Sequence[GapsError]) -> list[LogError]:
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
     """Give files without a stated kind the kind that recognises them as one experiment.
 
-    They stay as they are if no kind does.
+    Without such a kind, the files are returned unchanged.
     """
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
@@ -143,9 +143,10 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
 
 
 def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
-    """Convert a file whose force is not in newtons to forces in that unit, for kinds analysed per unit of force.
+    """Keep a force in its logged unit, such as volts, for kinds analysed per unit of force.
 
-    Raises InputError beside a stage with such an axis, whose numbers are in newtons.
+    `beside` is the axis of a given stage file, or None. Raises InputError with a stage file, whose numbers are in
+    newtons.
     """
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
@@ -165,9 +166,10 @@ def _holders(options: Mapping, paths: Sequence[Path]) -> dict[str, list[bool]]:
 
 
 def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) -> Mapping:
-    """Return the options that the file of a place can use, by which files have the channels.
+    """Return the options about channels that file number `place` has.
 
-    Options that no file can use stay, and raise an error when that file is read.
+    `holders` tells, by channel, which files have it. Options about channels that no file has are kept, and raise an
+    error when the file is read.
     """
     lacking = {name for name, held in holders.items() if any(held) and not held[place]}
     if not lacking:
@@ -190,7 +192,7 @@ def _has(path: Path, name: str) -> bool:
 
 
 def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
-    """Read a file, mapped by options over what was kept of it."""
+    """Read a file, mapped by the options and, beyond them, by its stored mapping."""
     if is_frequency_response(path):
         kind = next(name for name in KINDS if KINDS[name].responses)
         return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
@@ -235,7 +237,7 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """Return a log without known instants, sample by sample, to describe its course; None if not possible."""
+    """Return a log without known sample times, to describe its course; None if impossible."""
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
     except LogError:
@@ -248,13 +250,13 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
 
 
 def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
-    """Read the log with the signals that the kind of experiment needs."""
+    """Read a log with the signals that a kind of experiment needs."""
     chosen = KINDS[kind]
     return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:
-    """Return the only possible kind of experiment of a log without a stated kind, and the reason.
+    """Recognise the kind of experiment of a log, and return it with the reason.
 
     Raises InputError if no kind claims it, or several do.
     """

@@ -11,13 +11,13 @@ from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
 
 CONFIDENCE = 0.975
-"""Probability of Student's t up to the upper end of a 95 % interval."""
+"""Cumulative probability at the upper end of a 95 % interval, for Student's t."""
 
 
 def correlation_length(residual: np.ndarray) -> int:
-    """Count the rows after which residuals, (n,), are no longer correlated; 1 for white noise.
+    """Return over how many rows residuals, (n,), are correlated; 1 for white noise.
 
-    It is the integrated autocorrelation up to its first zero, to both sides.
+    The length is the autocorrelation summed to both sides, up to its first zero.
     """
     centred = residual - residual.mean()
     count = len(centred)
@@ -34,9 +34,8 @@ def correlation_length(residual: np.ndarray) -> int:
 def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return groups of samples whose errors may be correlated, each of shape (n,).
 
-    They are blocks of time, places, and speeds (accelerating and decelerating separately), of a position [m], velocity
-    [m/s] and acceleration [m/s^2]. Model errors return with place and speed, so a repeated motion gives no new
-    information.
+    Groups are blocks of time, of position [m], and of velocity [m/s], by sign of the acceleration [m/s^2]. Model errors
+    recur with place and speed, so a repeated motion gives no new information.
     """
     settings = IdentificationSettings.current()
     return (
@@ -47,7 +46,7 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
 
 
 def binned(values: np.ndarray, count: int) -> np.ndarray:
-    """Return the numbers of the bins, of equal width, that hold the values, shape (n,)."""
+    """Return the number of the bin, of equal width, of each value, shape (n,)."""
     edges = np.linspace(values.min(), values.max(), count + 1)[1:-1]
     return np.digitize(values, edges)
 
@@ -94,10 +93,10 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, shape (n, p), which are alike within a group.
+    """Return the covariance of the sum of scores, (n, p), which are correlated within groups.
 
-    It is scaled for normal intervals of `COVERAGE` deviations. The degrees of freedom are those of the number of
-    groups that count equally.
+    The covariance is scaled for normal intervals of `COVERAGE` deviations. The degrees of freedom count effectively
+    equal groups.
     """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
@@ -109,7 +108,7 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Invert X' X for columns X of length 1, and tell which columns others can replace.
+    """Invert X' X for unit columns X, and tell which columns the others can replace.
 
     Directions that the columns do not resolve are left out.
     """

@@ -1,4 +1,4 @@
-"""Write the identified stage file: the given stage (or one made up for a log), with the estimates."""
+"""Write the identified stage file: the estimates in the given stage, or in a stage assumed for a log."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ PLACEHOLDER = (
 
 
 def made_up(log: Log, inverse: InverseModel) -> Stage:
-    """Make up a stage around a log without any.
+    """Make a stage with assumed values for a log without a stage file.
 
-    It has one rigid mass, LuGre friction without Stribeck effect, a controller of our choice, and a move as fast as the
-    log's fastest.
+    The stage has one rigid mass, LuGre friction without Stribeck effect, a controller chosen by friso, and a move as
+    fast as the log's fastest motion.
     """
     settings = IdentificationSettings.current()
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
@@ -76,7 +76,7 @@ def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable
     """Return the stage with its identified keys as values with intervals, or as ranges.
 
     Units follow the stage's kind of axis. A stiffness that follows from a [flexure] is not replaced. Raises InputError
-    if the values contradict each other; values from `fitting` do not.
+    if the values contradict each other; values from `fitting` never do.
     """
     changes: dict[str, object] = {}
     for estimate in estimates:
@@ -103,7 +103,8 @@ def origins(
 ) -> dict[str, str]:
     """Return the origin of each key of an identified stage, in words.
 
-    It may be an estimate, another key, the stage file, or friso's choice of the `chosen` keys (None: all).
+    The origin is an estimate, another key that it follows, the stage file, or friso's choice of the `chosen` keys
+    (None: all).
     """
     sources: dict[str, str] = {}
     for estimate in estimates:
@@ -127,7 +128,7 @@ def with_origins(text: str, origins: Mapping[str, str]) -> str:
 
 
 def estimate_text(estimate: Estimate) -> str:
-    """Return an estimate as in a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N" if it is not determined."""
+    """Write an estimate for a stage file: "20.4 N +/- 0.1 N", or a range "1 N .. 2.5 N"."""
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
         return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"

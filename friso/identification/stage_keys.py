@@ -59,7 +59,7 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
 
 
 def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
-    """Divide the whole mass among the masses as in the stage."""
+    """Divide the total mass among the stage's masses in the stage file's proportion."""
     masses = {f"masses.{name}": value for name, value in stage.masses if value is not None}
     method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
     shares = {key: value / sum(masses.values()) for key, value in masses.items()}
@@ -70,9 +70,9 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """Complete an estimate that has one bound by the other bound from prior knowledge.
+    """Complete an estimate that has only one bound, by prior knowledge.
 
-    Static friction known as "at least" reaches up to the highest plausible ratio to Coulomb friction, unless the stage
+    A lower bound of static friction is completed by the highest plausible ratio to Coulomb friction, unless the stage
     has a value.
     """
     before = stage.uncertain().get(estimate.name)
@@ -84,12 +84,12 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
     top = OutputErrorSettings.current().highest_friction_ratio * value
-    # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that
+    # a bound equal to Coulomb friction adds nothing: static friction then follows Coulomb friction
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
-    """Return the estimate within the limits of its key, or None, and why it was changed."""
+    """Restrict an estimate to the limits of its key, or return None, with the reason."""
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
         knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
@@ -110,12 +110,12 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    """Return the known ends in words."""
+    """Write the finite ends of an estimate, each with its name."""
     return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
 
 
 def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
-    """Tell whether the key takes the text of the estimate."""
+    """Tell whether the key accepts the estimate as written in a stage file."""
     try:
         uncertain_value(estimate_text(estimate), field)
     except InputError:
@@ -126,9 +126,9 @@ def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
 def _static_above(
     stage: Stage, fields: Mapping[str, Quantity | Number], estimates: dict[str, Estimate], notes: list[str]
 ) -> dict[str, str]:
-    """Keep static friction at least as large as Coulomb friction, in `estimates`.
+    """Change `estimates` so that static friction is no smaller than Coulomb friction.
 
-    The less certain one follows the other in the ratio of the stage.
+    The less certain of both follows the other in the stage's ratio.
     """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
@@ -158,7 +158,7 @@ def _static_above(
 
 
 def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:
-    """Return the estimates with which the stage is valid.
+    """Return the estimates with which the stage file is valid.
 
     A key that breaks a rule of the stage file is removed from `estimates`.
     """

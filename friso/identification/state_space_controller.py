@@ -21,8 +21,8 @@ NAMES = ("a", "b", "c", "d")
 class StateSpace(RationalController):
     """A controller by matrices, from error to force: x' = a x + b e, F = c x + d e.
 
-    With a `sample_time` the equations are for samples. Matrices are in SI, as MATLAB writes them ("0 1; 0 -400"), or
-    named in a file.
+    With a `sample_time` the equations step from sample to sample. Matrices are in SI units, written as in MATLAB ("0 1;
+    0 -400"), or named in a file.
     """
 
     kind: Literal["state_space"]
@@ -54,7 +54,7 @@ class StateSpace(RationalController):
         if first is None:
             raise InputError("controller", "matrices by which no error makes a force", "a controller that acts")
         pencil = np.block([[a, b], [c, d]])
-        shift = 1.0 + np.abs(poles).max(initial=0.0)  # no pole: the Rosenbrock matrix is regular there
+        shift = 1.0 + np.abs(poles).max(initial=0.0)  # at a point that is no pole the Rosenbrock matrix is regular
         mass = np.zeros_like(pencil)
         mass[:size, :size] = np.eye(size)
         inverse = np.linalg.eigvals(np.linalg.solve(pencil - shift * mass, mass))
@@ -63,7 +63,7 @@ class StateSpace(RationalController):
 
 
 def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:
-    """Return the four matrices. Raises InputError."""
+    """Return the matrices a, b, c and d. Raises InputError."""
     texts = [flat[f"controller.{name}"] for name in NAMES]
     if (file := flat.get("controller.file")) is None:
         matrices = [_parsed(name, text) for name, text in zip(NAMES, texts, strict=True)]
@@ -82,7 +82,7 @@ def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:
 
 
 def _parsed(name: str, text: str) -> np.ndarray:
-    """Return a matrix that is written as MATLAB does. Raises InputError."""
+    """Parse a matrix that is written as in MATLAB. Raises InputError."""
     rows = [row.replace(",", " ").split() for row in text.strip().strip("[]").split(";") if row.strip()]
     try:
         return np.array([[float(number) for number in row] for row in rows]).reshape(len(rows), -1)

@@ -22,10 +22,10 @@ SHOWN_BY: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
     "friction.bristle_damping": (_OF_BRISTLES,),
     "joint.stiffness": ((("steps",), "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)"),),
 }
-"""The experiments that show a key, or one of a table: the kinds of which a log would be one, and what to do."""
+"""Experiments that show a key, or a table's keys: the kinds that such a log may have, and what to do."""
 
 
 def ways_to_show(key: str, done: Set[str] = frozenset()) -> str:
-    """Return the experiments that would show a key, but for kinds that were `done`; "" for none."""
+    """Describe the experiments that would show a key, except for `done` kinds; "" if none."""
     ways = SHOWN_BY.get(key) or SHOWN_BY.get(key.split(".")[0]) or ()
     return " or ".join(text for kinds, text in ways if not {*kinds} & done)

@@ -1,6 +1,6 @@
 """Define `Answer`, which every function of friso with a command returns.
 
-People, pages and programs read one and the same answer.
+The terminal, pages and programs show one and the same answer.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ Returned = TypeVar("Returned")
 
 
 def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """Turn the function of a question into a function of friso.
+    """Turn the function of a question into a public function of friso (a decorator).
 
-    Its arguments are checked, shared parameters are added to its docstring, and the kind of axis that it speaks of
-    stays its own.
+    The decorated function checks its arguments, and restores the kind of axis, by which units are named, when it ends.
+    Shared parameters are added to the docstring.
     """
     function.__doc__ = described(function)
     answer = check_arguments(function)
@@ -73,7 +73,7 @@ _SHOWN = {
     "document_of_details",
     "files",
 }
-"""Methods of an answer that show it."""
+"""Names of the methods by which an answer is shown."""
 
 
 def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
@@ -90,11 +90,11 @@ def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) ->
 class Answer:
     """What friso answers to a question.
 
-    The answer in words stands first (`sentences`), then small `tables`, then `details`. Functions in the
-    folder of its question make these: `words.sentences`, `words.tables`, `words.details`, `words.blocks`,
-    `words.next_steps`, and, of the question NAME, `figures.NAME_figures`, `document.NAME_document`, `page.NAME_files`.
-    Each takes the `subject`; an answer that shows something else overrides the method. `result` is what the analysis
-    returned: whatever else is asked of the answer is asked of the result, so that ``cases["given"]`` is a case of
+    The answer in words stands first (`sentences`), then small `tables`, then `details`. Functions in the folder of its
+    question make these: `words.sentences`, `words.tables`, `words.details`, `words.blocks`, `words.next_steps`, and, of
+    the question NAME, `figures.NAME_figures`, `document.NAME_document`, `page.NAME_files`. Each function takes the
+    `subject`; an answer that shows something else overrides the method. `result` is what the analysis returned.
+    Attributes and items that the answer lacks are taken from the result, so that ``cases["given"]`` is a case of
     `friso.check` and ``runs.outcome`` a variable of `friso.sweep`.
 
     Attributes
@@ -111,10 +111,10 @@ class Answer:
     axis_kind: AxisKind = LINEAR
 
     status: ClassVar[int] = 1
-    """The exit status of the command where the answer is a failure."""
+    """Exit status of the command if the answer is a failure."""
 
     def __init__(self, result: Any, **parts: Any) -> None:
-        """Keep the result, and other `parts` as attributes.
+        """Store the result, and other `parts` as attributes.
 
         The kind of axis is taken from the stage, unless it is one of the parts.
         """
@@ -123,13 +123,13 @@ class Answer:
         vars(self).update(parts)
 
     def __init_subclass__(cls) -> None:
-        """Make all that an answer shows use the units of its axis."""
+        """Make all methods that show an answer use the units of its axis."""
         cls.package = cls.__module__.rpartition(".")[0]
         for name in _SHOWN & vars(cls).keys():
             setattr(cls, name, _in_its_units(getattr(cls, name)))
 
     package: ClassVar[str]
-    """The folder of the question, whose modules show its answers."""
+    """Package of the question, whose modules show its answers."""
 
     @property
     def command(self) -> str:
@@ -143,9 +143,9 @@ class Answer:
 
     @property
     def subject(self) -> Any:
-        """Return what the functions that show the answer take.
+        """Return the argument of the functions that show the answer.
 
-        It is the result, or the answer itself if that holds more.
+        The subject is the result, or the answer itself if it has attributes besides.
         """
         return self.result
 
@@ -160,7 +160,7 @@ class Answer:
         return False
 
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
-        """Return what a function of the question's folder makes of the answer.
+        """Show the answer by a function of the question's folder, and return its result.
 
         Returns `otherwise` if the folder has no such function.
         """
@@ -173,15 +173,15 @@ class Answer:
         return self._shown_by("words", "sentences", ())
 
     def blocks(self) -> Sequence[str]:
-        """Return drawings and files in characters of one width."""
+        """Return drawings and files as text for a fixed-width font."""
         return self._shown_by("words", "blocks", ())
 
     def tables(self) -> Sequence[AnswerTable]:
-        """Return the numbers that the answer rests on, as texts."""
+        """Return small tables with the numbers behind the answer, as texts."""
         return self._shown_by("words", "tables", ())
 
     def details(self) -> Sequence[str]:
-        """Return what else there is to say, one paragraph each."""
+        """Return further paragraphs, which `--details` shows."""
         return self._shown_by("words", "details", ())
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
@@ -197,7 +197,7 @@ class Answer:
         return self._shown_by("document", f"{self._name}_document", {})
 
     def files(self) -> Files:
-        """Return what the command writes, by name."""
+        """Return the contents of the files that the command writes, by name."""
         return self._shown_by("page", f"{self._name}_files", {})
 
     @property
@@ -208,7 +208,7 @@ class Answer:
         return dataset_of(self.to_dict())
 
     def document_of_details(self) -> dict[str, Any]:
-        """Return what `--details` adds to the JSON document; it may take further computation."""
+        """Return what `--details` adds to the JSON document; this may take further computation."""
         return {}
 
     def to_dict(self, details: bool = False) -> dict[str, Any]:
@@ -290,7 +290,7 @@ class Answer:
         return [place]
 
     def _page(self, place: Path) -> str:
-        """Return the page among the files. Raises InputError for a command without a page."""
+        """Return the HTML page that belongs to a path. Raises InputError for a command without a page."""
         page = next((content for name, content in self.files().items() if name.endswith("html")), None)
         if not isinstance(page, str):
             raise InputError("path", str(place), f"a folder: friso {self.command} has no page", 'report("folder")')

@@ -1,6 +1,6 @@
 """Turn the numbers of a JSON document into an xarray.Dataset.
 
-Units come from the ends of keys, and dimensions from tables of equal form.
+Units come from the suffixes of keys, and dimensions from tables with equal keys.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LEAF = (bool, int, float, str, type(None))
 
 
 def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
-    """Return what a document holds as a Dataset.
+    """Convert a JSON document to a Dataset.
 
     The first table of tables, such as "cases" or "models", gives a dimension of its name, and each of its numbers a
     variable along it. The document's own numbers become variables, and its texts attributes.

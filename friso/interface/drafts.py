@@ -30,13 +30,13 @@ A folder that a killed process left behind is deleted by the next command."""
 _LOCK = "lock"
 
 _LEVELS = 4
-"""Number of parent folders in which leftovers are searched; no command writes deeper below its output folder."""
+"""Number of parent folders in which leftover drafts are searched; no command writes deeper below its output folder."""
 
 
 class Drafts:
     """Drafts of files, on the disk where the files are to be.
 
-    They are deleted at the end of the `with` block unless they were put in place.
+    Drafts are deleted at the end of the `with` block unless they were put in place.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Drafts:
             self.made.close()
 
     def add(self, path: Path, content: Content) -> None:
-        """Write the draft of a file; for the content None, an earlier file is deleted in the end."""
+        """Write the draft of a file; with the content None, an existing file is to be deleted."""
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder")
         self._tidy(path)
@@ -71,9 +71,9 @@ class Drafts:
     def put_in_place(self, may_replace: Collection[Path] = ()) -> None:
         """Give all drafts their names; only files that `may_replace` names are replaced.
 
-        After an error, all is as it was before. Ctrl-C waits until the drafts are gone. At any moment, a name has
-        either the earlier file or the new one. Raises FileExistsError if any other file is in the way by now, or
-        another OSError.
+        After an error, all files are as before. Ctrl-C waits until the drafts are gone. At any moment, a name has
+        either the earlier or the new file. Raises FileExistsError if another file has appeared meanwhile, or another
+        OSError.
         """
         undo: list[Callable[[], object]] = []
         raise_what_waits()
@@ -88,7 +88,7 @@ class Drafts:
                     if draft is None:
                         delete_file(path)
                     else:
-                        with suppress(FileNotFoundError):  # of a link that leads nowhere
+                        with suppress(FileNotFoundError):  # also for a link that leads nowhere
                             shutil.copymode(path, draft)
                         replace_file(draft, path)
                 elif draft is not None:
@@ -96,7 +96,7 @@ class Drafts:
                     undo.append(partial(delete_file, path))
         except BaseException:
             for step in reversed(undo):
-                with suppress(OSError):  # the rest is undone all the same
+                with suppress(OSError):  # continue undoing the rest
                     step()
             raise
 
@@ -113,7 +113,7 @@ class Drafts:
     def _spare(self, path: Path) -> Path:
         """Return a free path on the disk of `path`, with its suffix."""
         parents = path.absolute().parents
-        root = next((folder for folder in parents if folder.exists()), parents[-1])  # a drive that is not there
+        root = next((folder for folder in parents if folder.exists()), parents[-1])  # the drive does not exist
         if root not in self.folders:
             with hold_interrupts():
                 self.folders[root] = self.made.enter_context(locked_folder(root, DRAFTS, _LOCK))
@@ -121,17 +121,17 @@ class Drafts:
 
 
 def _duplicate(path: Path, spare: Path) -> None:
-    """Keep a file under another name as well; a symbolic link stays one."""
+    """Give a file a second name, by a link or a copy; a symbolic link stays a link."""
     try:
         os.link(path, spare, follow_symlinks=False)
-    except (OSError, NotImplementedError):  # a disk without links
+    except (OSError, NotImplementedError):  # the disk has no links
         shutil.copy2(path, spare, follow_symlinks=False)
 
 
 def made(folder: Path) -> list[Path]:
     """Make a folder and the missing ones above it; return those made, the outermost first.
 
-    Raises OSError, and then leaves none of them behind.
+    Raises OSError, after removing the folders already made.
     """
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     done: list[Path] = []

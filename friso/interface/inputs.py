@@ -25,7 +25,7 @@ Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
 """Keys to be overridden: a dictionary, or texts KEY=VALUE."""
 
 Whole: TypeAlias = int
-"""A whole number whose limits `whole_number` checks, however large it is."""
+"""A whole number of any size, whose limits `whole_number` checks."""
 
 Seed: TypeAlias = int
 """A seed of random numbers, from 0 to 2147483647."""
@@ -36,7 +36,7 @@ ForceLike: TypeAlias = float | str
 FrequencyLike: TypeAlias = float | str
 RatioLike: TypeAlias = float | str
 Tolerance: TypeAlias = float | str
-"""Numbers in SI, or texts with a unit: "1 um"."""
+"""Numbers in SI units, or texts with a unit: "1 um". These are the types of tolerances and quantities."""
 
 AxisRange: TypeAlias = str
 AxisPoints: TypeAlias = str
@@ -53,7 +53,7 @@ ExperimentName: TypeAlias = str
 StudyName: TypeAlias = str
 ClaimName: TypeAlias = str
 Address: TypeAlias = str
-"""Names, of which a wrong one is answered with all of them; and the address of a scheduler."""
+"""Names chosen from a list (a wrong name is answered with the list); and the address of a scheduler."""
 
 Links: TypeAlias = Changes
 Roles: TypeAlias = Changes
@@ -68,7 +68,7 @@ LOGGER = logging.getLogger("friso")
 
 
 def stage_of(source: StageLike, changes: Changes = None) -> Stage:
-    """Return a stage with keys overridden, from any form. Raises InputError."""
+    """Read a stage from a Stage, path or dictionary, and override keys. Raises InputError."""
     wanted = changes_of(changes)
     if isinstance(source, Stage | Mapping):
         stage = source if isinstance(source, Stage) else Stage(**source)
@@ -88,7 +88,7 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:
-    """Return the tables of a stage as written, complete or not. Raises InputError."""
+    """Return the tables of a stage file as written, even if incomplete. Raises InputError."""
     if isinstance(source, Stage):
         return source.as_written()
     return dict(source) if isinstance(source, Mapping) else load_tables(source)
@@ -108,10 +108,10 @@ def changes_of(changes: Changes) -> dict[str, Any]:
 def read_stage(
     source: StageLike, changes: Changes = None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
 ) -> Stage:
-    """Return a stage with keys overridden, and log doubts about it.
+    """Read a stage, override keys, and log doubts about the stage.
 
-    The logger "friso" says if centres of uncertain keys are used, unless `uncertain_too`. It also names the tables that
-    the analysis `leaves_out`. Raises InputError.
+    The logger "friso" reports that centres of uncertain keys are used (unless `uncertain_too`), and names the tables
+    that the analysis `leaves_out`. Raises InputError.
     """
     stage = stage_of(source, changes)
     for doubt in (*implausible_values(stage), *idle_encoder(stage)):
@@ -132,7 +132,7 @@ def read_stage(
 def mention_unstable_loop(stage: Stage) -> None:
     """Log that the loop of a stage is unstable, if it is.
 
-    The logger "friso" says so before work that may take minutes and whose answer depends on it.
+    The logger "friso" reports this before work that may take minutes and whose answer depends on stability.
     """
     from friso.hunting import unstable
     from friso.shown.loop_words import unstable_loop
@@ -153,7 +153,7 @@ def correlations_of(source: StageLike, stage: Stage) -> Correlations:
 
 
 _LONGEST_STEM = 150
-"""Longest part, in bytes, that is taken from another file's name."""
+"""Longest part [bytes] of another file's name that is used in names of written files."""
 
 
 def stem_of(source: StageLike, usual: str = "stage") -> str:
@@ -177,12 +177,12 @@ def tolerance_of(value: str | float) -> float:
 
 
 def text_of(value: str | float, unit: str) -> str:
-    """Return a quantity as in a stage file: a text unchanged, a number with its unit."""
+    """Write a quantity as in a stage file: a text unchanged, a number with `unit` appended."""
     return value if isinstance(value, str) else exactly(value, unit)
 
 
 def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
-    """Return a text with a unit, or a number in SI, as an SI value. Raises InputError."""
+    """Convert a text with a unit, or a number in SI, to an SI value. Raises InputError."""
     try:
         return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
@@ -205,7 +205,7 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
 
 
 def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
-    """Read one of some texts. Raises InputError for anything else."""
+    """Check that a value is one of `choices`. Raises InputError for anything else."""
     if not (isinstance(value, str) and value in choices):
         raise InputError(
             name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example

@@ -67,7 +67,7 @@ class OutputFolder:
 
     @property
     def unfinished(self) -> Path:
-        """Return a folder for finished parts of long work, from which the next run goes on."""
+        """Return the folder for finished parts of long work, from which the next run continues."""
         return self.folder / UNFINISHED
 
     def check(self, names: Iterable[str]) -> None:
@@ -107,7 +107,7 @@ class OutputFolder:
         gone = {name for name, content in files.items() if content is None}
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
         leaving = [name for name in gone if os.path.lexists(self.folder / name)]
-        # The marker first: where the process is killed on the way, the next knows what is there for its own.
+        # The marker comes first: if the process is killed, the next run knows which files are its own.
         write({**self._marker([*names, *leaving]), **contents, **(beside or {})}, own, progress)
         if self.is_own:
             self.is_marked, self.files = True, tuple(names)
@@ -120,7 +120,7 @@ class OutputFolder:
         return written(contents)
 
     def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
-        """Return the marker with names of files, if the folder is the command's own."""
+        """Return the marker file with names of written files, if the folder is the command's own."""
         return {self.folder / MARKER: marker(self.command, names)} if self.is_own else {}
 
 
@@ -168,7 +168,7 @@ def check_file(
     """Check that a file named by the user may be written.
 
     Raises InputError if it is among the `inputs`, which are read, or exists already. An existing file is allowed if it
-    `is_own` or may be overwritten. The message suggests another name, or `example`.
+    `is_own` or may be overwritten. The message suggests another name, or the `example`.
     """
     refuse_place(option, path)
     another = f"{path.stem}-2{path.suffix}"
@@ -192,9 +192,9 @@ def write_file(option: str, path: Path, content: Content, overwrite: bool) -> No
     Raises InputError if it must not be written, or cannot.
     """
     check_file(option, path, overwrite)
-    place = Path(os.path.realpath(path))  # a link stays one
+    place = Path(os.path.realpath(path))  # a link stays a link
     try:
-        path.parent.stat()  # a folder that is missing is a mistake, not one to make
+        path.parent.stat()  # a missing folder is a mistake, and is not made
         write({place: content}, [place] if overwrite else ())
     except OSError as error:
         raise _unwritable(option, path, error, path.name) from None
@@ -218,7 +218,7 @@ def output_folder(
 def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
     """Write files so that at any moment all or none are in place, and return their paths.
 
-    Files that `may_replace` does not name must be new. Raises FileExistsError if one is not, and another OSError if it
+    Files that are not in `may_replace` must be new. Raises FileExistsError if one exists, and another OSError if one
     cannot be written.
     """
     with drafts_of(files, progress) as drafts:
@@ -247,7 +247,7 @@ def _are_one(path: Path, other: Path) -> bool:
 
 
 def marker(command: str, names: Iterable[str]) -> str:
-    """Return the text of the marker: the command, and the files that are its own."""
+    """Return the text of the marker file: the command, and the files that it wrote."""
     lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
     return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
 
@@ -280,7 +280,7 @@ def _of_others(folder: Path, maker: str, expected: str) -> InputError:
 
 
 def _beside(folder: Path) -> str:
-    """Return the option that names another folder."""
+    """Return a suggested `--out` option: the folder's name with "-2", as FOLDER is taken."""
     return f"--out {shell_word(f'{folder}-2' if folder.name.strip('.') else 'report')}"
 
 
@@ -304,7 +304,7 @@ def _check_writable(folder: Path) -> None:
     try:
         with hold_interrupts():
             for path in reversed(made(folder)):
-                path.rmdir()  # for now: it appears with what is written
+                path.rmdir()  # for now: the folder appears with the written files
         _try_draft(folder / MARKER)
     except OSError as error:
         expected = f"a folder that can be written ({cause_of(error)})"
@@ -314,7 +314,7 @@ def _check_writable(folder: Path) -> None:
 def _try_draft(path: Path) -> None:
     """Raise OSError if no draft of a file can be made.
 
-    On Windows and on network shares, nothing else tells whether a file can be written.
+    On Windows and on network shares, only trying shows whether a file can be written.
     """
     with Drafts() as drafts:
         drafts.add(path, "")

@@ -39,7 +39,7 @@ TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 class Choices:
     """A list below the help of a command: names, each with one line on it.
 
-    It is read only when the help is asked for.
+    The list is read only when the help is shown.
     """
 
     title: str
@@ -48,7 +48,7 @@ class Choices:
 
 @dataclass(frozen=True)
 class Question:
-    """One question: the location of its function, and how its command takes and shows it.
+    """One question: where its function is, and how its command takes options and shows answers.
 
     Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is not a number.
     """
@@ -57,39 +57,39 @@ class Question:
     """The package whose module `question` holds the function."""
 
     place: float
-    """Its place below its topic in `friso --help`; lower numbers come first."""
+    """Position below the topic in `friso --help`; lower numbers come first."""
 
     topic: str
 
     example: str
-    """Command lines without "friso", one a line, shown below the help; the first one is "Example:"."""
+    """Example command lines without "friso", one per line, shown below the help."""
 
     takes: tuple[str, ...] = ("stage",)
     """Parameters that the command takes as arguments; every other one is an option."""
 
     function_name: str = ""
-    """Name of the function; "": that of the package."""
+    """Name of the function; "": the package's name."""
 
     folder: str = ""
-    """Folder of the files written without --out; "": none are written then."""
+    """Folder for files without --out; "": no files are written without --out."""
 
     writes: bool = True
-    """Whether the answer has files, and the command --out and --overwrite."""
+    """Whether the answer has files, so that the command has --out and --overwrite."""
 
     document: bool = True
     """Whether the command has --json."""
 
     details: bool = False
-    """Whether the answer has details, and the command --details."""
+    """Whether the answer has details, so that the command has --details."""
 
     files: tuple[str, ...] = ()
-    """Files that may not be in the way when the command begins."""
+    """Names of files that must be writable before the command begins its work."""
 
     during: str = ""
     """Label of the progress bar until the work reports its own."""
 
     answers_interrupted: bool = False
-    """Whether Ctrl-C ends the work with an answer by what was done so far."""
+    """Whether Ctrl-C ends the work with an answer from the results so far."""
 
     choices: Choices | None = None
 
@@ -97,10 +97,10 @@ class Question:
     """Defaults of the command that differ from those of the function."""
 
     metavars: Mapping[str, str] = field(default_factory=dict)
-    """Word for the value of a parameter in the help, if the word of its kind says too little."""
+    """Placeholder of a parameter's value in the help, if the usual placeholder says too little."""
 
     runner: str = ""
-    """Module whose function `run` replaces the usual command, where showing the answer is not enough."""
+    """Module whose function `run` replaces the usual command, which only shows the answer."""
 
     def __post_init__(self) -> None:
         """Check topic and place. Raises ValueError or TypeError."""
@@ -132,7 +132,7 @@ class Question:
         """
         if self.package.startswith("friso."):
             return getattr(import_module(self.module), self.in_python)
-        _ = self.summary  # which refuses a function without docstring
+        _ = self.summary  # raises for a function without docstring
         return load_declared(GROUP, self.name, self.module, self.in_python, Callable)
 
     @property
@@ -142,7 +142,7 @@ class Question:
 
     @property
     def options(self) -> list[str]:
-        """Return the parameters that are options, even those that the command line cannot express."""
+        """List all parameters that are options in Python, with or without a command-line form."""
         return [name for name in self.parameters if name not in self.takes and name not in OF_THE_CALLER]
 
     @cached_property
@@ -167,7 +167,7 @@ class Question:
 
 
 OF_THE_CALLER = ("folder", "partly", "beside", "keep", "progress")
-"""Parameters that a command supplies itself, to say where files are kept."""
+"""Parameters that the command supplies itself, such as the folder and the progress."""
 
 QUESTIONS = Registry[Question]("friso.questions", "QUESTION", GROUP, Question)
 """The questions: one for each folder of `friso/questions/`, and those of installed packages."""

@@ -42,7 +42,7 @@ def specification_schema() -> Node:
 
 
 SCHEMAS: Mapping[str, Callable[[], Node]] = {"stage": stage_schema, "specification": specification_schema}
-"""Functions that make the schemas, by what they describe."""
+"""Functions that make the schemas, by the kind of file."""
 
 
 def _document(cls: type[Section], title: str, described: Mapping[str, str]) -> Node:
@@ -128,14 +128,14 @@ def _classes(pick: Any) -> list[type[Section]]:
 
 @cache
 def _attributes(cls: type[Section]) -> dict[str, str]:
-    """Return the texts below the keys in the source of a class and of its bases."""
+    """Return the docstrings of keys, from the source of a class and of its bases."""
     texts: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         if not issubclass(base, Section):
             continue
         try:
             body = ast.parse(textwrap.dedent(inspect.getsource(base))).body[0].body  # type: ignore[attr-defined]
-        except (OSError, TypeError):  # a class that was made by a function
+        except (OSError, TypeError):  # a class that was made by a function has no source
             continue
         for node, below in pairwise(body):
             if (
@@ -166,6 +166,6 @@ def _template() -> dict[str, str]:
 
 
 def _sentence(text: str) -> str:
-    """Return a text with a capital first letter and a full stop."""
+    """Give a text a capital first letter and a full stop."""
     text = text.strip().rstrip(":.;")
     return f"{text[0].upper()}{text[1:]}." if text else ""

@@ -17,7 +17,7 @@ from typing import Any
 class SharedOption:
     """The type and meaning of a shared parameter in docstrings.
 
-    Its line in the help of a command is given if it differs.
+    The line in a command's help is given if it differs from the docstring.
     """
 
     kind: str
@@ -78,10 +78,10 @@ def described(function: Callable[..., Any]) -> str:
 
 
 def meaning(function: Callable[..., Any], name: str) -> str:
-    """Return what a command's help says of a parameter.
+    """Return the text of a parameter in a command's help.
 
-    It is the first paragraph of the parameter's description. Numbers in SI are left out, since a command line takes
-    texts with units.
+    The text is the first paragraph of the parameter's description, without mentions of SI numbers, since a command line
+    takes texts with units.
     """
     own = {parameter: block for names, block in _parts(function.__doc__ or "")[1] for parameter in names}
     shared = SHARED.get(name)
@@ -103,7 +103,7 @@ def _parts(text: str) -> tuple[str, list[tuple[list[str], str]], str]:
 
 
 def _entries(text: str) -> Iterator[tuple[list[str], str]]:
-    """Yield the entries of a section of parameters: their names, "only, keep", and their lines."""
+    """Yield the entries of a docstring's parameters: the names ("only, keep") and the lines."""
     for block in re.split(r"\n(?=\w)", text.strip("\n")):
         if block:
             yield [name.strip() for name in block.partition(":")[0].split(",")], block.rstrip()

@@ -29,7 +29,8 @@ def examples_folder() -> Path:
 def example_names() -> list[str]:
     """Return the names of the examples that come with friso.
 
-    Specifications stand after "specs/". Parameter files of drives stand after "drives/", with their endings.
+    Names of specifications begin with "specs/"; names of drives' parameter files begin with "drives/" and keep their
+    suffix.
     """
     return sorted(_examples())
 
@@ -134,7 +135,8 @@ def _start(
 ) -> str:
     """Return the text of a file to start from.
 
-    It is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises InputError.
+    The text is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises
+    InputError.
     """
     if spec is not None and source is not None:
         raise InputError("spec", "together with --from", "one of the two", "friso init --from machine.ini")

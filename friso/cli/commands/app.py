@@ -1,4 +1,4 @@
-"""`friso app`: all of it live in the browser."""
+"""`friso app`: check a stage live in the browser."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
     from friso.questions.identify.page import STAGE
     from friso.shown.drawing.images import drawing_beside
 
-    assert shown.out is not None  # it has a default
+    assert shown.out is not None  # the option has a default
     read = [*about[0], *options.get("predict", ()), *([options["stage"]] if "stage" in options else [])]
     target = OutputFolder(question.name, shown.out, shown.overwrite, read)
     target.check([STAGE])
@@ -59,7 +59,7 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
     """Store what the user said of each log, and return the files written.
 
-    A log whose record already says the same is left out.
+    A log whose stored mapping is unchanged is left out.
     """
     from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
@@ -73,9 +73,9 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
         if (place := kept_at(path, mapping, folder)) is not None
     }
     if any(place.parent == folder for place in texts):
-        target.write({}, beside=texts)  # so that the folder is known for its own next time
+        target.write({}, beside=texts)  # marks the folder as the command's own for the next run
     else:
-        write(texts, [*filter(Path.is_file, texts)])  # mappings too, as they could be read
+        write(texts, [*filter(Path.is_file, texts)])  # mappings may be replaced too, since they could be read
     if texts:
         first, *more = texts
         others = f" and {len(more)} more" if more else ""

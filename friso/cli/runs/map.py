@@ -34,7 +34,7 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         def written() -> list[Path]:
             """Write figure, page and exports, and return their paths.
 
-            They go beside the store, or into another folder that was named.
+            The files go beside the store, or into a folder given by --out.
             """
             if elsewhere is not None:
                 return [*elsewhere.write(answer.files(progress), progress), *answer.exports]

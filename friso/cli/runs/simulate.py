@@ -11,6 +11,6 @@ from friso.interface.question import Question
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Ask about a file, or with --cell about a cell."""
+    """Simulate the stage of a file or, with --cell, one cell of a map's store."""
     words = about[0] or []
     ask(question, [words if "cell" in options else [Path(word) for word in words]], options, shown)

@@ -111,7 +111,7 @@ class OrbitSettings(Settings):
     """Runs through which the slope is fitted. Fewer follow the scatter of returns."""
 
     least_slope_runs: int = setting(30, "")
-    """Fewest runs that must come back. With fewer, the range reaches beyond a break of the map."""
+    """Fewest returning runs for the slope of a return map. With fewer, the range crosses a break of the map."""
 
     near_return_share: float = setting(0.25, "of the range")
     """Largest distance of a return from the others. Farther off it belongs to another branch of the map."""

@@ -16,7 +16,7 @@ from friso.identification.settings import DoubtSettings
 from friso.intervals import COVERAGE
 
 MEDIAN = 1.25
-"""Standard deviation of a median over that of a mean, of normal errors: sqrt(pi / 2), to two digits."""
+"""Ratio of the standard deviations of median and mean, for normal errors: sqrt(pi / 2), rounded."""
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
@@ -38,7 +38,7 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
-    """Return the friction [N] at which motions begin, if it exceeds static friction's interval."""
+    """Return the break-away friction [N] if it exceeds the interval of static friction, else None."""
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
     if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
@@ -56,7 +56,7 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return how far friction may exceed static friction [N] up to the given speeds [m/s], (n,)."""
+    """Return by how much friction may exceed static friction [N] up to given speeds [m/s], (n,)."""
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)

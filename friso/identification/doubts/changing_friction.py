@@ -23,8 +23,8 @@ from friso.identification.settings import DoubtSettings
 class RecordDrift:
     """Shifts of fitted numbers, (free,), if friction and a constant force may change.
 
-    `friction` and `constant` [N] are the changes over the record; their reaches [N] are the deviations from their
-    means.
+    `friction` and `constant` [N] are the changes of friction and constant force over the record; their reaches [N] are
+    the largest deviations from the means.
     """
 
     moved: np.ndarray
@@ -72,10 +72,10 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
 def changing_forces(
     fit: OutputErrorFit, velocity: np.ndarray
 ) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
-    """Return forces of friction and of a constant force that change along a record, (n,) each.
+    """Build the forces by which friction and a constant force could change along a record.
 
-    `velocity` [m/s] is that of the record. Each force may follow a straight line over either half of the record. Also
-    returns the sizes [N] at which they are tried, and the shapes of these lines.
+    `velocity` [m/s] is the record's. Each force, shape (n,), rises along a straight line in either half of the record.
+    Also returns the sizes [N] at which forces are tried, and the shapes of the lines.
     """
     settings = DoubtSettings.current()
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
@@ -85,7 +85,7 @@ def changing_forces(
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:
-    """Return the changes during the record of an inverse model with one friction for both directions."""
+    """Return the changes during the record of an inverse model with equal friction both ways."""
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     bends = _bends(share, counted)
@@ -94,16 +94,17 @@ def changes_beside(inverse: InverseModel) -> RecordDrift | None:
 
 
 def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
-    """Return two shapes of change along a record, less their means, at fractions of its time, (n,).
+    """Return two shapes of change along a record, without their means, shape (n,) each.
 
-    One rises to 1 in the middle and falls again; the other rises to 1 from the middle to the end.
+    `share` is the fraction of the record's time. One shape rises to 1 in the middle and falls again; the other rises to
+    1 from the middle to the end.
     """
     shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
 
 def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
-    """Return the changes along the record from the sizes of their bends."""
+    """Compute the changes along the record from the fitted sizes of their `bends`."""
     if explained is None:
         return None
     friction, constant = (part @ np.stack(bends) for part in np.split(explained.sizes, 2))
@@ -112,7 +113,7 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
-    """Return the fit with deviations that include the changes, and the shifts of the fit, of both forces."""
+    """Widen the fit's deviations by the changes of friction and constant force, and their shifts."""
     further = np.abs(changes.moved)
     for i, name in enumerate(fit.fitted):
         if name == "friction.coulomb":
@@ -123,7 +124,7 @@ def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
 
 
 def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
-    """Return the inverse model with intervals that include changes during the record, and the shifts by them."""
+    """Widen the inverse model's intervals by changes during the record and the shifts they cause."""
     over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
     answers = []
     for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):

@@ -14,10 +14,11 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit the force by error, its derivatives and integral, over the whole record and over two parts of it.
+    """Compare control laws that are fitted to the whole record and to two parts of it.
 
-    The parts are divided by an instant, by speed of the reference, or by place. One linear controller has equal gains
-    in all parts, whatever the machine does. With drifting clocks the law changes as well, but not its size.
+    A law is the force as a linear function of error, its derivatives and integral. The parts are divided by an instant,
+    by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
+    does. With drifting clocks the phase of the law changes as well, but not its size.
     """
     settings = DoubtSettings.current()
     if "reference" not in case.log:
@@ -51,11 +52,11 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Return signals of a linear controller, the stretch of each row, and the variables on which gains may depend.
+    """Return signals of a linear controller, stretches, and variables on which gains may depend.
 
     The signals, shape (rows, 9), are the error, its derivatives and integral, the motion of the reference and its
-    direction, and last the force [N], all through one filter. Rows with a force at its limits are left out; they
-    separate the stretches. The variables have one value per row.
+    direction, and last the force [N], all passed through one filter. Rows with a force at its limits are left out, and
+    separate the numbered stretches. The variables have one value per row.
     """
     settings, log, part = DoubtSettings.current(), case.log, case.log.longest
     step, cutoff = log.sample_time, settings.bandwidths_of_a_controller * case.inverse.bandwidth
@@ -88,9 +89,9 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
 
 
 def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the columns of a control law and its force [N] as deviations from their means over each stretch.
+    """Subtract the means over each stretch from the columns of a control law and its force [N].
 
-    The integral may stand between stretches, so that the force of each has a constant of its own.
+    The integral may have changed between stretches, so each stretch has a constant force of its own.
     """
     _, number, count = np.unique(stretch, return_inverse=True, return_counts=True)
     means = np.stack([np.bincount(number, signal) / count for signal in signals.T], axis=1)
@@ -99,7 +100,7 @@ def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:
-    """Return the ratio of a force to the `usual` one, each of shape (rows,) [N]; 1 if they are not proportional."""
+    """Return the ratio of a force to the usual force, (rows,) [N]; 1 if not proportional."""
     likeness = float(usual @ force) / (float(np.linalg.norm(usual) * np.linalg.norm(force)) or 1.0)
     if likeness < DoubtSettings.current().likeness_of_a_law:
         return 1.0

@@ -13,7 +13,7 @@ from friso.quantities import percent
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Count the samples at the largest and the smallest force.
 
-    A clipped force is too small just where inertia is large, which distorts mass and friction.
+    A clipped force is too small exactly where inertia is large, which distorts mass and friction.
     """
     share = checks.clipped_share(case.log["force"])
     if share > LogSettings.current().share_of_clipped_samples:

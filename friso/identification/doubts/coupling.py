@@ -15,12 +15,12 @@ from friso.quantities import percent
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Look for a load on a coupling: a force proportional to the second derivative of the acceleration.
+    """Look for a load on a coupling, by the second derivative of the acceleration.
 
-    A load m behind the measured position, on a coupling of natural frequency w, seems to weigh m / (1 + s^2 / w^2) in
-    motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If the
-    position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times that
-    derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then.
+    If the motor's position is measured, a load m on a coupling of natural frequency w seems to weigh m / (1 + s^2 /
+    w^2) in motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If
+    the position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times
+    that derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then.
     """
     fit = case.fit
     for tried, explained in case.explained(forces) if not is_free(case.flat) else ():
@@ -29,7 +29,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(fit=further)
             return
         share = -float(np.expm1(-lighter))
-        words = _sentence(share) if case.may_name("coupling") else ""  # an averaged motion makes such a force too
+        words = _sentence(share) if case.may_name("coupling") else ""  # averaged motion looks like such a force
         yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 
@@ -48,7 +48,7 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def _sentence(share: float) -> str:
-    """Write the sentence on a coupling that changes the mass by a relative amount."""
+    """Write the sentence on a coupling that changes the identified mass by the fraction `share`."""
     where, way = (
         ("a part of the load moved on a coupling behind the measured position", "smaller")
         if share > 0

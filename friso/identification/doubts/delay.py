@@ -16,8 +16,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Look for a delay of the force, by the derivative of the logged force.
 
     A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
-    turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. It is tried if the
-    stage follows the log. A slow motion cannot tell a delay from friction at its reversals: no delay is named then.
+    turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. Only a stage that
+    follows the log is examined. In slow motion a delay cannot be told from friction at the reversals, and is not named.
     """
     for tried, explained in case.explained(forces):
         late, words = -float(explained.sizes[0]), ""

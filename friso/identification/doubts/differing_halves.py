@@ -14,12 +14,12 @@ from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
 WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
-"""Words for the quantities of the inverse model in sentences."""
+"""Quantities of the inverse model, as named in sentences."""
 
 
 @dataclass(frozen=True)
 class Half:
-    """A quantity of the inverse model with its values in both halves of a record, and an interval that spans both."""
+    """A quantity of the inverse model in both halves of a record, with an interval over both."""
 
     name: str
     first: float
@@ -39,7 +39,7 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def halves(inverse: InverseModel) -> list[Half]:
-    """List mass, viscous and Coulomb friction that differ between the halves of a record beyond both spreads."""
+    """List the inverse model's quantities that differ between the halves beyond both spreads."""
     fits = []
     for part in np.array_split(np.arange(len(inverse.measured)), 2):
         columns, force = inverse.columns[part], inverse.measured[part]

@@ -1,4 +1,4 @@
-"""Doubt: a delay between force and motion grows or shrinks along the record, with two clocks or a buffer that fills."""
+"""Doubt: the delay between force and motion drifts along the record, by two clocks or a filling buffer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the delays at beginning and end, if a changing delay explains more than one."""
+    """Name the delays at beginning and end if a changing delay explains more than a constant one."""
     effect = case.led_by("drifting-delay")
     if effect is None:
         return

@@ -11,7 +11,7 @@ from friso.identification.inverse_model import inverse_model
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Fit the inverse model with time as a further column.
+    """Fit the inverse model with a force in proportion to time as an additional column.
 
     The force of a channel that warms up, or of a process, may drift while the machine does not change.
     """

@@ -15,7 +15,8 @@ from friso.quantities import percent
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Compare the resolution of the force with Coulomb friction.
 
-    Noise of a digit and more makes up for coarse ones, so most steps of the force are zero in a log that is told.
+    Noise of a digit or more dithers a coarse resolution, so the doubt is raised only if most steps of the force are
+    zero.
     """
     settings, force = DoubtSettings.current(), case.log["force"][case.log.longest]
     digit, coulomb = digit_of(force), abs(case.inverse.value("coulomb"))

@@ -22,8 +22,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both directions. If these
     differ, the common fit need not lie between them, so deviations are widened to reach both results, beyond chance. If
-    the model lacks something, the search starts everywhere, because the common fit may be an optimum of neither
-    direction.
+    the model lacks something, the search starts from everywhere in the parameters' ranges, because the common fit may
+    be far from either direction's optimum.
     """
     both, settings = case.fit, DoubtSettings.current()
     if both.explains(case.quality.noise):

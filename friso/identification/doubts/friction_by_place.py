@@ -12,7 +12,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name by how much friction differs along the way, if that explains most of the residual."""
+    """Name the variation of friction along the way if it explains most of the residual."""
     effect = case.led_by("friction-by-place")
     if effect is None:
         return
@@ -45,4 +45,4 @@ DOUBT = Doubt(
     after=("friction-by-direction",),
     forces=forces,
 )
-"""The places are those of a force along the way; a part that changes sign with the direction is friction."""
+"""The doubt divides the way into the places of `cogging`; a force that changes sign with direction is friction."""

@@ -9,7 +9,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare the longest stretch without a gap, the only one that is fitted, with the whole record.
+    """Compare the longest stretch without a gap, which alone is fitted, with the whole record.
 
     Derivatives and filters do not reach across a gap.
     """

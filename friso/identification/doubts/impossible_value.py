@@ -11,17 +11,17 @@ from friso.quantities import non_negative, positive
 from friso.stage import numeric_keys
 
 NOT_ABOVE_ZERO = "its interval reaches down to zero"
-"""Reason why a quantity that cannot be zero has no value."""
+"""Reason given for a quantity without a value: it must be positive but its interval contains zero."""
 
 NEGATIVE = "it comes out negative, which it cannot be"
-"""Reason why a quantity whose whole interval is negative has no value."""
+"""Reason given for a quantity without a value: its whole interval is negative."""
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Cut intervals at 0 for keys that allow no less, and refuse impossible values.
+    """Cut intervals at 0 for keys that cannot be negative, and refuse impossible values.
 
-    An estimate with a negative interval is refused; one that cannot be 0 is bounded from above if its interval contains
-    0.
+    An estimate with a negative interval is refused. A key that must be positive gets an upper bound only, if its
+    interval contains 0.
     """
     bounds = {key: declared.bound for key, declared in numeric_keys(case.flat).items()}
     answers = {}

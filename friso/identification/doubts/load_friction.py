@@ -14,10 +14,10 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Look for friction in proportion to the motor's force.
 
-    It makes a mass seem heavier while the motor drives it than while the motor brakes it, but the model has one mass
-    and one Coulomb friction for both. A machine of 3 kg and 5 N, with a tenth of the force as friction, came out at
-    3.13 to 3.36 kg and 5.44 to 5.60 N without a warning. The effect is named if it explains much of the residual, and
-    more than a coupling, a delay, or friction that changes with time.
+    Such friction makes a mass seem heavier while the motor accelerates it than while it brakes, but the model has one
+    mass and one Coulomb friction for both. Without this doubt, a machine of 3 kg and 5 N with a tenth of the force as
+    friction was identified as 3.13 to 3.36 kg and 5.44 to 5.60 N. The effect is named if it explains much of the
+    residual, and more than a coupling, a delay, or friction that changes with time.
     """
     settings, effect = DoubtSettings.current(), case.leading
     if effect is None or effect.doubt != "load-friction":

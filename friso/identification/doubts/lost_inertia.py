@@ -13,8 +13,8 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Compare the inertia of the masses with the residual beyond noise.
 
-    Any part of the residual may pass for inertia, so a mass with less inertia is not determined. Its relative
-    uncertainty is at least the square of the ratio of both (friso's choice).
+    Any part of the residual may pass for inertia, so a mass with less inertia is not determined. The mass's relative
+    uncertainty is at least the squared ratio of residual to inertia (friso's choice).
     """
     masses = {key: one for key, one in case.determined.items() if key in ("masses.cart", "masses.stage")}
     inertia = sum(mass.value for mass in masses.values()) * float(np.sqrt(np.mean(case.acceleration**2)))

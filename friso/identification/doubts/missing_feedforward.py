@@ -20,9 +20,9 @@ ACCELERATION, DIRECTION = "reference acceleration", "reference direction"
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Look for feedforward missing from the logged force, by acceleration and direction of the reference.
+    """Look for a feedforward of acceleration or direction missing from the logged force.
 
-    Both must improve the fit while the stage is fast.
+    The feedforward must improve the fit while the stage is fast, too.
     """
     fed = fed_forward(case)
     if fed is None or not lacks_when_fast(case.inverse, fed[1]):
@@ -82,7 +82,7 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
 
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
-    """Return acceleration [m/s^2] and direction of the reference, (n,) each; {} without a reference."""
+    """Return the reference's acceleration [m/s^2] and direction, (n,) each; {} without one."""
     settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}

@@ -1,4 +1,4 @@
-"""Doubt: the records support other friction laws than that of the stage."""
+"""Doubt: the records support other friction laws than the stage's."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from friso.stage import Stage
 
 
 def find(case: tuple[LawComparison, Stage]) -> Iterator[RaisedDoubt]:
-    """Check whether the records support the law of the stage."""
+    """Check whether the records support the stage's friction law."""
     laws, stage = case
     model, supported = stage.flat()["friction.model"], [law.law for law in laws.supported]
     if supported and model not in supported and model in (law.law for law in laws.predictions):

@@ -13,7 +13,8 @@ from friso.identification.settings import DoubtSettings
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """State the mass in case the logged force leaves out a feedforward.
 
-    The reference's acceleration explains much more of the force, but not clearly so while the stage is fast.
+    The doubt is raised if the reference's acceleration explains much more of the force, but not clearly while the stage
+    is fast.
     """
     fed, share = missing_feedforward.fed_forward(case), DoubtSettings.current().error_share_of_a_cause
     if fed is None or fed[0].error >= share * case.inverse.error:

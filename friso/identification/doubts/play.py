@@ -18,8 +18,8 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
-    If the widest play that is tried explains most, something slower is the cause: it is not named, and the intervals
-    allow for it.
+    If the widest play that is tried explains most, something slower is the cause: no play is named, but the intervals
+    are widened.
     """
     settings, effect = DoubtSettings.current(), case.led_by("play")
     if effect is None:
@@ -41,8 +41,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that the motor saves while the load is loose, for each width of play.
 
-    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose. A width
-    that the load crosses within a few samples is not tried, because what happens between samples would pass for it.
+    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose. Widths
+    that the load crosses within a few samples are not tried, because motion between samples would look like play.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
     if not {MASS, "friction.coulomb"} <= {*fit.problem.names}:

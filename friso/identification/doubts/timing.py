@@ -1,4 +1,4 @@
-"""Doubt: a delay between force and motion, or an average over one of both, by a filter or a slow channel."""
+"""Doubt: force and motion differ in timing: one is delayed, or averaged by a filter or a slow channel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from friso.identification.settings import DoubtSettings
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
     """Search for the shift of the force, and the average of force or motion, that fit best.
 
-    Shifts and averages are doubled in turn, and the best is refined once to both sides.
+    Lags and widths of 1, 2, 4, ... samples are tried; the best is then refined once to either side.
     """
     log, settings = case.log, DoubtSettings.current()
     fits: dict[tuple[int, int], InverseModel] = {(0, 1): case.inverse}
@@ -46,14 +46,14 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _doubling(most: float) -> list[int]:
-    """List 1, 2, 4 and so on, up to a number."""
+    """List the powers of two from 1 up to `most`."""
     return [2**power for power in range(int(np.log2(most)) + 1)] if most >= 1 else []
 
 
 def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
-    """Fit the inverse model with the force `lag` samples later and the motion averaged over `width` samples.
+    """Fit the inverse model with the force delayed by `lag` and the motion averaged over `width`.
 
-    A negative `width` averages the force instead.
+    Both count samples. A negative `width` averages the force instead.
     """
     moved = _force_moved(case.log, lag, max(-width, 1))
     return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=max(width, 1))
@@ -62,7 +62,7 @@ def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
     """Return the error of the inverse model with force and motion averaged alike.
 
-    It serves as a check, because averaging the force alone merely hides what is fast.
+    The error serves as a check: averaging the force alone merely hides fast residuals.
     """
     if width >= 0:
         return np.inf

@@ -1,4 +1,4 @@
-"""Doubt: in a frequency response the motion opposes the force, by a wrong sign of one of both."""
+"""Doubt: in a frequency response the motion opposes the force, because one of them has the wrong sign."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from friso.identification.response.analysis import Bench
 
 
 def find(bench: Bench) -> Iterator[RaisedDoubt]:
-    """Examine the sign of the driven mass.
+    """Check the sign of the driven mass.
 
-    A mass line is at -180 degrees; one at 0 degrees has the wrong sign.
+    The phase of a mass line is -180 degrees; 0 degrees means a wrong sign.
     """
     model = bench.two_masses
     if not (model.signs[0] < 0 if model is not None else any(line.sign < 0 for line in bench.lines[:1])):

@@ -1,6 +1,6 @@
 """Force ramps from rest, each until the body moves off: static friction.
 
-The break-away force is that at which a body at rest begins to move; it falls with the force rate.
+The break-away force is the force at which a body at rest begins to move; it falls with the force rate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] from the break-away forces of `ramps`, extrapolated to rate 0, in total and per direction."""
+    """Static friction [N] from force ramps, in total and per direction, extrapolated to rate 0."""
 
     static: Estimate
     forward: Estimate
@@ -72,7 +72,7 @@ def _partial(log: Log) -> bool:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
-    """Analyse a log of force ramps, with the masses that are believed to move."""
+    """Analyse a log of force ramps, with the moving mass known beforehand."""
     (log,) = logs
     assert isinstance(log, Log)
     return static_from_ramps(log, sum(prior.masses(log)))

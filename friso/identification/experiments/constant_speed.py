@@ -23,7 +23,7 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class FrictionAtSpeeds:
-    """Friction against velocity and against position, of one log."""
+    """Friction over velocity and over position, from one log of constant speeds."""
 
     velocity: FrictionVelocity
     position: FrictionPosition
@@ -46,7 +46,7 @@ def _stated_exponent(prior: Prior) -> float | None:
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return friction in both directions, and the constant force, in the order of the covariance.
+    """Return estimates of friction and constant force, in the order of the covariance.
 
     An exponent that the stage states is not included.
     """
@@ -80,7 +80,7 @@ def _partial(log: Log) -> bool:
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Claim logs that mostly move at constant speeds, enough for a curve of friction over speed.
 
-    At the slowest speeds a body may stick and slip, so a log with one direction counts too.
+    At the slowest speeds a body may stick and slip, so logs in one direction are claimed too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

@@ -31,7 +31,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 def _claims(course: Course) -> str | None:
     """Claim a log in which a periodic excitation moves a stage whose reference stands.
 
-    It hardly rests, contains many frequencies, and turns often.
+    The motion of such a log hardly rests, contains many frequencies, and turns often.
     """
     settings = ExperimentSettings.current()
     repetition = None if course.reference_moves else course.repetition
@@ -43,9 +43,10 @@ def _claims(course: Course) -> str | None:
 
 
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return masses and joint from a two-mass model in newtons and metres.
+    """Return estimates of masses and joint from a two-mass model in newtons and metres.
 
-    A mass line alone gives the whole mass. A resonance nearer to the parasitic mode than to the joint's gives no joint.
+    A mass line alone gives the total mass. A resonance nearer to the parasitic mode than to the joint's mode gives no
+    joint.
     """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
@@ -67,7 +68,7 @@ def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
 def _of_stage_alone(mass: float, stage: Stage) -> bool:
     """Tell whether a mass line [kg] shows the stage alone instead of all moving masses.
 
-    Above the mode of a free joint the stage moves alone. The line belongs to the nearer of the assumed masses.
+    Above the mode of a free joint the stage moves alone. The nearer of the stage's assumed mass and the total decides.
     """
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:
@@ -77,7 +78,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's, or None."""
+    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's mode, or None."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None
@@ -97,7 +98,7 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
 
 
 def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
-    """Return the relative errors of the outputs over the band, with the driven mass first."""
+    """Return the relative prediction errors of another log's outputs, the driven mass first."""
     return predicted(result, log, settings.period)
 
 

@@ -1,4 +1,4 @@
-"""A log of hunting: how often the stage swings, how fast, how far and how evenly, beside the cycle that friso predicts.
+"""A log of hunting: number, period, amplitude and evenness of swings, compared with the predicted cycle.
 
 Thesis, Sec. 3.2.2 and 4.3.2, Fig. 24 to 27.
 """
@@ -23,7 +23,7 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class PredictedCycle:
-    """Limit cycle of a stage by prediction: amplitude [m] and period [s]."""
+    """Predicted limit cycle of a stage: amplitude [m] and period [s]."""
 
     amplitude: float
     period: float
@@ -35,8 +35,8 @@ class HuntingLog:
 
     `count` is the number of whole cycles. `period` [s] and `amplitude` [m], half of peak to peak, are means over them,
     with their standard deviations. `above` and `below` [m] are the mean peaks on either side of the reference.
-    `predicted` is the cycle of the stage file (None: no file, or it does not hunt). `time` [s] and `deviation` [m] have
-    the shape (n,), and `peaks` are the numbers of the highest samples.
+    `predicted` is the cycle predicted from the stage file (None: no file, or no hunting). `time` [s] and `deviation`
+    [m] from the reference have the shape (n,); `peaks` are the sample numbers of the peaks.
     """
 
     count: int
@@ -68,7 +68,7 @@ def swings_of(log: Log) -> HuntingLog:
         start = int(changes[-1]) + 1 if changes.size else 0
         time, position, reference = time[start:], position[start:], reference[start:]
     deviation = position - (reference if "reference" in log else np.median(position))
-    low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # by then the transient is over
+    low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # the later part, after the transient
     side = _sides(deviation - (low + high) / 2, ExperimentSettings.current().hysteresis_of_swings * (high - low) / 2)
     ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
     if len(ups) < 3:
@@ -96,7 +96,7 @@ def swings_of(log: Log) -> HuntingLog:
 def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
     """Return the side of 0 of values, 1 or -1, with hysteresis; shape (n,).
 
-    Values within the hysteresis keep the last side.
+    Values within the hysteresis keep the previous side.
     """
     side = np.where(np.abs(values) > hysteresis, np.sign(values), 0.0)
     last = np.maximum.accumulate(np.where(side != 0, np.arange(len(side)), 0))
@@ -104,7 +104,7 @@ def _sides(values: np.ndarray, hysteresis: float) -> np.ndarray:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> HuntingLog:
-    """Analyse a log of hunting, and predict the cycle of the stage, if there is one."""
+    """Analyse a log of hunting, and predict the cycle of the stage, if a stage file is given."""
     (log,) = logs
     assert isinstance(log, Log)
     shown = swings_of(log)

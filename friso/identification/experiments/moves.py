@@ -1,4 +1,4 @@
-"""Moves, with a reference or without: mass, friction and constant force, and the joint where it shows."""
+"""Moves, with a reference or without: mass, friction and constant force, and the joint if it shows."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ OUT_OF_STEP = (
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose reference moves, or without a periodic excitation.
+    """Claim a log of moves: its reference moves, or it has no periodic excitation.
 
-    It has no series of constant speeds or force ramps; the position rests in between, or the force has few frequencies,
-    as with sines.
+    Such a log has no series of constant speeds or force ramps. Its position rests in between, or its force has few
+    frequencies, as with sines.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
@@ -77,13 +77,13 @@ def _in_newtons(log: Log) -> bool:
 
 
 def _around(log: Log) -> Stage | None:
-    """Make up a stage for a log whose force is in newtons."""
+    """Make a stage with assumed values for a log whose force is in newtons."""
     part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
 def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of keys of the stage file, for a force in newtons."""
+    """Return estimates of stage-file keys if the force was in newtons, else none."""
     return result.estimates if _in_newtons(result.log) else ()
 
 
@@ -93,7 +93,7 @@ def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Corre
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
-    """List where the simulated drive differs from the given one, and where no controller was known."""
+    """List where the simulated drive differs from the machine's, and missing controllers."""
     settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
@@ -125,7 +125,7 @@ def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: Analysis
 
 
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
-    """Check that a log can be identified in the machine's own loop, and that another can be simulated.
+    """Check that logs can be identified in the machine's loop, and another log simulated.
 
     Raises InputError otherwise.
     """

@@ -58,9 +58,9 @@ class Presliding:
     """Bristles and moving mass from small motion before sliding.
 
     Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles have the `correlation` of shape (3, 3).
-    Signals over time [s], shape (n,), are the position [m] of the body on the bearing, the low-passed force [N], and
-    that of the model (empty without one). `unexplained` is the fraction of the friction's standard deviation that the
-    model leaves.
+    Signals over time [s], shape (n,), are the position [m] of the body on the bearing, its low-passed force [N], and
+    the model's force (empty without a model). `unexplained` is the fraction of the friction's standard deviation that
+    the model leaves.
     """
 
     mass: Estimate
@@ -84,9 +84,9 @@ class _Fit:
     """A fit of mass and bristles at one low-pass.
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is how much of
-    each the residual may hide. `late` [s] is the delay of the force beyond the assumed one. `ends` tells whether the
-    bristles reach their limit, and `left` is the fraction of the friction that is left. Signals over time [s], shape
-    (n,), are position of the body on the bearing, its force and that of the model, low-passed.
+    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` tells whether the
+    search for the bending stopped at a limit, and `left` is the unexplained fraction of the friction. Low-passed
+    signals over time [s], shape (n,), are the position of the body on the bearing, its force and the model's.
     """
 
     values: np.ndarray
@@ -104,13 +104,13 @@ class _Fit:
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Estimate bristles from motion that is small against their break-away deflection.
 
-    The log has position and force; if it has gaps, the longest stretch is used. A joint is held, or its deflection is
+    The log has position and force; if it has gaps, the longest stretch is used. A joint must be held, or its deflection
     measured.
 
-    The intervals include the change with a lower low-pass and with the best-fitting delay (which is used if none is
-    given), the uncertainty of the viscous friction that is subtracted from the damping, and the residual: friction
-    falls with speed, which the model leaves out, and bristles of another law bend otherwise. With a large residual
-    nothing is determined. Raises InputError for missing channels.
+    The intervals include: the change with a lower low-pass and with the best-fitting delay (used if no delay is known);
+    the uncertainty of the viscous friction subtracted from the damping; and the residual, because the model leaves out
+    that friction falls with speed and that bristles of another law bend differently. With a large residual nothing is
+    determined. Raises InputError for missing channels.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
@@ -155,7 +155,7 @@ def _nothing(why: str) -> Presliding:
 
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
-    """Return why the fit is not one of bristles; "" if it is."""
+    """Return why a fit shows no bristles; "" if it does."""
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
@@ -167,7 +167,7 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
-    """Make an estimate of one of the three quantities, which has to be positive."""
+    """Make the estimate of mass, damping or stiffness, which must be positive."""
     settings = ReadingSettings.current()
     estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
     if estimate.low > 0:
@@ -184,7 +184,7 @@ def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late:
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Fit the force at a low-pass by least squares, with a search for the one nonlinear parameter, the bending.
+    """Fit the force at a low-pass by least squares, and search the bending, which is nonlinear.
 
     `mass` [kg] is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
     """
@@ -215,7 +215,7 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
 
 
 def _apart(columns: np.ndarray, number: int) -> float:
-    """Return the norm of the part of one column, of shape (m, p), that the others do not explain."""
+    """Return the norm of the part of a column that the other columns, (m, p), do not explain."""
     sizes = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(sizes > 0, sizes, 1.0)
     others = np.delete(scaled, number, axis=1)
@@ -240,7 +240,8 @@ class _Equation:
     def columns(self, bending: float) -> np.ndarray:
         """Return the columns of bristles of a bending q [1/m] and all others, shape (m, p).
 
-        They are inertia, rate and deflection of the bristles, the decay of an initial deflection, and the rest.
+        Columns are inertia, rate and deflection of the bristles, the decay of an initial deflection, then the fixed
+        columns.
         """
         moves = np.diff(self.body)
         z = deflections(moves, np.full(len(moves), 1 / bending))
@@ -252,8 +253,8 @@ class _Equation:
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
     """Set up the equation of a record.
 
-    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position: its part
-    that `between` does not know is among the other columns.
+    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position: the part
+    of this effect that `between` does not describe is among the fixed columns.
     """
     time, low_pass = record.time, LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(record, between, mass)
@@ -263,7 +264,7 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
-    """Analyse a log, and subtract viscous friction from the damping if it is known."""
+    """Analyse a log of small motion, and subtract viscous friction from the damping if known."""
     (log,) = logs
     assert isinstance(log, Log)
     between = believed_between(prior, log)
@@ -282,13 +283,13 @@ def _at_most(total: Estimate) -> Estimate:
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return the bristles, and the whole mass for a stage whose masses add up to it."""
+    """Return estimates of the bristles and, if the stage's masses add up to it, the total mass."""
     masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
     return (result.stiffness, result.damping, *masses)
 
 
 def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates with their correlation in the fit; masses are parts of one sum."""
+    """Return the determined estimates with their correlation in the fit."""
     certain = determined(estimates)
     rows = [result.order(estimate.name) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]

@@ -1,10 +1,10 @@
 """Slow motion that swings, or sticks and slips: Coulomb and static friction, Stribeck velocity.
 
 Where friction falls steeply no controller holds a constant speed, and `friction_velocity` has nothing to read. The
-motion itself goes through all those speeds: LuGre's bristles, dz/dt = v - sigma_0 |v| z / g(v) with
-g = F_c + (F_s - F_c) exp(-(v/v_s)^2) (Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425), follow from the motion
-that was measured, with no loop to be simulated, and F_c, F_s, v_s from the force they have to make up. Mass, stiffness
-and damping of the bristles come from other experiments, see `presliding`.
+swinging motion itself passes through all slow speeds: LuGre's bristles, dz/dt = v - sigma_0 |v| z / g(v) with g = F_c +
+(F_s - F_c) exp(-(v/v_s)^2) (Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425), follow from the measured motion
+without simulating a loop; F_c, F_s and v_s follow from the measured friction force. Mass, stiffness and damping of the
+bristles come from other experiments, see `presliding`.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class SlowSliding:
 
     `estimates` are Coulomb and static friction [N] and Stribeck velocity [m/s], with the `correlation` of shape (3, 3).
     Signals over time [s], shape (n,), are the velocity [m/s] of the body on the bearing, its low-passed friction [N],
-    and that of the model (empty without one). `unexplained` is the fraction of the friction's standard deviation that
-    the model leaves.
+    and the model's friction (empty without a model). `unexplained` is the fraction of the friction's standard deviation
+    that the model leaves.
     """
 
     estimates: tuple[Estimate, ...]
@@ -101,7 +101,8 @@ class _Equation:
     def model(self, p: np.ndarray) -> np.ndarray:
         """Return the low-passed friction [N] of the model, shape (m,).
 
-        The first three fitted numbers are logarithms relative to their `sizes`, the other two fractions of theirs.
+        The first three fitted numbers `p` are logarithms relative to their `sizes`, the other two are fractions of
+        their `sizes`.
         """
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
         stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
@@ -111,7 +112,7 @@ class _Equation:
         return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 
     def residual(self, p: np.ndarray) -> np.ndarray:
-        """Return model less measured friction [N], shape (m,)."""
+        """Return the model's friction minus the measured friction [N], shape (m,)."""
         return self.model(p) - self.friction
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
@@ -128,7 +129,7 @@ class _Equation:
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
-    """Estimate Coulomb and static friction and the Stribeck velocity from slow sliding there and back.
+    """Estimate Coulomb and static friction and Stribeck velocity from slow sliding both ways.
 
     If the log has gaps, the longest stretch is used, up to a number of samples in the settings. A joint is held, or its
     deflection is measured.
@@ -167,14 +168,14 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
-    """Return the prior values with each quantity in turn at the end of its interval."""
+    """Return copies of the prior values, each with one quantity at the end of its interval."""
     doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
 def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return the shift of the fitted numbers by a residual, (m,), for derivatives (m, p)."""
+    """Return the shift of fitted numbers that a residual, (m,), causes, by derivatives (m, p)."""
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
@@ -185,7 +186,7 @@ def _nothing(why: str) -> SlowSliding:
 
 
 def _unknown(why: str) -> tuple[Estimate, ...]:
-    """Return the three quantities as not determined, with the reason."""
+    """Return Coulomb friction, static friction and Stribeck velocity as not determined."""
     return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
 
 
@@ -240,7 +241,7 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 def _estimates(
     best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Convert fitted logarithms into the three quantities and their correlation.
+    """Convert fitted logarithms to friction and Stribeck velocity, with their correlation.
 
     The logarithms have a covariance, shape (3, 3), and possible `shifts`, shape (m, 3); `left` is the unexplained
     fraction of the friction.
@@ -259,7 +260,7 @@ def _estimates(
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """Return the estimates as far as the motion determines them, given the unexplained fraction of the friction."""
+    """Withdraw estimates that the motion does not determine, with the reason."""
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())

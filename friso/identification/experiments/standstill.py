@@ -1,4 +1,4 @@
-"""Standstill in position: how far the stage wanders while its reference stands, and how logs of it compare.
+"""Standstill in position: how far the stage wanders while its reference stands still, compared between logs.
 
 Thesis, Sec. 4.3.2, Fig. 28.
 """
@@ -22,8 +22,8 @@ from friso.stage import Stage
 class Wandering:
     """Deviation of a stage in one log while its reference stands.
 
-    It has RMS about the mean and largest deviation from it [m], drift over the log [m] by a straight line, and the
-    deviation [m] over time [s], both of shape (n,).
+    Fields are RMS and largest deviation from the mean [m], drift over the log [m] by a straight line, and the deviation
+    [m] over time [s], both of shape (n,).
     """
 
     name: str
@@ -43,7 +43,7 @@ class StandstillResult:
 
     @property
     def ratios(self) -> tuple[tuple[float, float], ...]:
-        """Return the RMS and the peak of every log over those of the first log, NaN if that does not move."""
+        """Return the ratios of RMS and peak of every log to the first log's; NaN if it stands."""
         first = self.logs[0]
         pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
         return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)
@@ -77,7 +77,7 @@ def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate,
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose reference stands still, and which has no force."""
+    """Claim a log without a force whose reference stands still."""
     log = course.log
     if "reference" not in log or course.reference_moves or "force" in log:
         return None

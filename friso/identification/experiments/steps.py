@@ -1,8 +1,8 @@
 """Position steps with the cart fixed: stiffness of the joint.
 
-Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator holds the joint alone, so the differences of force over those of
-deflection are its stiffness, whatever constant force there is besides; and they are that even if the cart creeps, where
-the deflection is measured.
+Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator only holds the joint, so differences of force over differences of
+deflection are its stiffness, whatever the constant force. If the deflection is measured, this holds even while the cart
+creeps.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ class Window:
 class StepStiffness:
     """The stiffness [N/m] of a joint from position steps with the cart fixed.
 
-    It is given for all steps, and for steps up and down; `hysteresis` [N] is the difference in force at a deflection
-    reached from below and from above. Further fields are the settled `windows`, the low-passed force [N], shape (n,),
-    and whether the cart was fixed (None: not measured).
+    Stiffness is given for all steps, and for steps up and down. `hysteresis` [N] is the difference in force between a
+    deflection reached from below and from above. Further fields are the settled `windows`, the low-passed force [N],
+    shape (n,), and whether the cart was fixed (None: not measured).
     """
 
     stiffness: Estimate
@@ -129,7 +129,7 @@ def _scale(position: np.ndarray, spans: list[slice]) -> float:
 
 
 def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
-    """Return the approximate stiffness [N/m] from the later half of each plateau; 0 without two plateaus."""
+    """Return a rough stiffness [N/m] from the later half of plateaus; 0 for fewer than two."""
     levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
     if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
         return 0.0
@@ -141,8 +141,8 @@ def _settled_window(
 ) -> Window | None:
     """Return the part of a plateau that has settled; None without one.
 
-    There the deflection hardly drifts, and the force drifts no more than in proportion, apart from a fraction of a step
-    or from noise.
+    In the settled part the deflection hardly drifts, and the force drifts no more than in proportion, apart from noise
+    or a fraction of a step.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
@@ -174,8 +174,8 @@ def _drifting(values: np.ndarray) -> tuple[Mean, float]:
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
     """Fit the differences of force over those of deflection by a line through the origin.
 
-    Neighbouring differences share a window: the variance is the larger of that of independent differences (a drifting
-    force) and of differences of independent windows (noise), and at least that of the noise within the windows.
+    Neighbouring differences share a window, so the largest of three variances counts: for independent differences
+    (drifting force), for differences of independent windows (noise), and by the noise within windows.
     """
     method = METHOD + words
     count = int(chosen.sum())
@@ -237,12 +237,12 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return the stiffness, unless the stage has no joint."""
+    """Return the estimate of the joint's stiffness; none for a stage without a joint."""
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log whose position rests in several places, with a standing reference.
+    """Claim a log without a moving reference whose position rests in several places.
 
     The force at these places rises with the position.
     """

@@ -1,7 +1,7 @@
 """Slow motion on a free joint, the cart sticking and slipping: static friction.
 
-Thesis, Sec. 4.2.3, Fig. 20. While the cart sticks the joint pulls at it with k_j times its deflection, and more and
-more; at the peak the cart breaks away, and its velocity shows a spike.
+Thesis, Sec. 4.2.3, Fig. 20. While the cart sticks, the joint pulls at it with k_j times the growing deflection; at the
+peak the cart breaks away, and its velocity shows a spike.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ KEY = "friction.static"
 class StickSlip:
     """Static friction from slow motion that sticks and slips.
 
-    Fields are static friction [N] in total and per direction; the mean break-away force [N] per direction as measured
-    at its force rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or
-    unequal friction); and the joint's `stiffness` [N/m] from force and deflection of this log.
+    Fields are static friction [N] in total and per direction; the mean break-away force [N] per direction at the
+    measured force rate, and its range over the slips (5 to 95 %); a force [N] common to both directions (sensor offset,
+    or unequal friction); and the joint's `stiffness` [N/m] from force and deflection of this log.
 
     Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor),
     break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
@@ -128,7 +128,7 @@ def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Return the low-passed actuator force less the stage's inertia [N]; None if the force is not measured."""
+    """Return the low-passed actuator force minus the stage's inertia [N]; None without a force."""
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -145,14 +145,14 @@ def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the low-passed force on the cart [N], and the relative deviation of its scale."""
+    """Return the low-passed force on the cart [N], and the relative error of its scale."""
     if stiffness is None:
-        return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
+        return channel(log, "force") if pushed is None else pushed, 0.0  # raises if missing
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
     if not (np.isfinite(value) and value > 0 and np.isfinite(half)):
         raise InputError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
     if deflected is None:
-        deflected = channel(log, "relative_position")  # raises: without it the pull of the joint is not known
+        deflected = channel(log, "relative_position")  # raises if missing
     return value * deflected, half / COVERAGE / value
 
 
@@ -170,11 +170,11 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
 def _peak(
     pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
 ) -> tuple[int, float, float, float, bool]:
-    """Find where the pull peaks between visible motion and top speed, and how high.
+    """Find the peak of the pull between the onset of visible motion and top speed.
 
-    Returns its place and height, the pull at the onset of visible motion, the rate at which it rose over the last third
-    of the rest, and whether it had stopped rising: it stayed within a hundredth of its peak for several times as long
-    as its usual rate and the filter take.
+    Returns the peak's sample and height, the pull at the onset, the rate at which the pull rose over the last third of
+    the rest, and whether it had stopped rising: it stayed within a hundredth of the peak for several times as long as
+    its usual rate and the filter take.
     """
     settings = ExperimentSettings.current()
     rest, onset, start, top = marks
@@ -196,7 +196,7 @@ def _unseen(speed: np.ndarray) -> float:
     """Count the samples for which motion may have been hidden in noise.
 
     The speed, (n,), from its first visible sample to its maximum, grew by a power of two in the time of its first
-    doubling. A body that accelerates evenly was hidden for less.
+    doubling. An evenly accelerating body would be hidden for less.
     """
     settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])
@@ -207,7 +207,7 @@ def _unseen(speed: np.ndarray) -> float:
 
 
 def _why(shares: list[float]) -> str:
-    """Return why there are no slips."""
+    """Return why a log has no slips, from the fractions of time spent sliding."""
     if shares and min(shares) > ReadingSettings.current().time_share_of_sliding:
         return "the cart slides all the time"
     return "the cart shows no slips out of rest"
@@ -216,7 +216,7 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
-    """Make the result from all slips."""
+    """Make the result of the analysis from the table of all slips."""
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
 
@@ -226,7 +226,7 @@ def _answer(
         if held[chosen].mean() > settings.share_of_held_slips:
             low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
-        used = chosen & (rates > 0)  # held ones may have none
+        used = chosen & (rates > 0)  # ranges of held mean values may be missing
         return static_friction(KEY, forces[used], rates[used], relative_error, late[used].mean())
 
     masks = dict(by_direction(directions))
@@ -288,8 +288,8 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 def _both(forward: Estimate, backward: Estimate) -> Estimate:
     """Return the mean of both directions, in which a common offset cancels.
 
-    If the cart slips in one direction only, its value counts. If one direction gives a value and the other a bound, the
-    result is a bound, because the offset is not known.
+    If the cart slips in one direction only, this direction's value counts. If one direction gives a value and the other
+    a bound, the result is a bound, because the offset is not known.
     """
     if not (forward.determined and backward.determined):
         seen, unseen = (forward, backward) if forward.determined else (backward, forward)
@@ -321,7 +321,7 @@ def _offset(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
-    """Analyse stick-slip logs with the joint's stiffness from other experiments, this log, or the stage file."""
+    """Analyse a stick-slip log, with the joint's stiffness from the best available source."""
     (log,) = logs
     assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)

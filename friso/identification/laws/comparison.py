@@ -1,6 +1,6 @@
 """Compare friction laws by cross-validation: each is fitted without a part of the record, and predicts that part.
 
-A law with more numbers always fits better, but does not always predict better. A law is supported unless it clearly
+A law with more parameters always fits better, but does not always predict better. A law is supported unless it clearly
 predicts worse than the best: by more than chance (a t test of the differences by parts and a sign test, at a level that
 counts all laws: Bonferroni), and by more than an error below which laws count as equal.
 """
@@ -29,7 +29,7 @@ from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
 @dataclass(frozen=True)
 class LawPrediction:
-    """A law fitted to all records, with its errors in predicting left-out parts.
+    """A friction law fitted to all records, with its errors in predicting left-out parts.
 
     The errors, shape (parts,), are relative to the friction's standard deviation in each part.
     """
@@ -69,7 +69,7 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """Return the laws that predict the record about as well as the best; empty if no law predicts it."""
+        """Return the laws that predict about as well as the best; empty if no law predicts."""
         settings = LawSettings.current()
         best = self.predictions[0]
         if not self.explained:
@@ -82,8 +82,9 @@ class LawComparison:
 def _worse(differences: np.ndarray, level: float) -> bool:
     """Tell whether errors, shape (parts,), exceed those of another law by more than chance.
 
-    Two tests are made, at half the `level` each: of the mean difference, and of the signs of the differences. The
-    difference must also exceed that of equal laws. A law that could not be run for a part is worse.
+    Two tests are made, at half the `level` each: of the mean difference, and of the signs of the differences. The mean
+    difference must also exceed the setting below which laws count as equal. A law that could not be run for a part is
+    worse.
     """
     settings = LawSettings.current()
     if not np.isfinite(differences).all():
@@ -138,7 +139,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
-    """Read records from the logs; return for the others why they cannot be used."""
+    """Read the logs as records; return the reasons why other logs cannot be used."""
     records, left_out = [], {}
     for log in logs:
         if not {"position", "force"} <= {*log.signals}:
@@ -154,7 +155,7 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
     """Fit a law to all records and to all but each part in turn, and predict that part."""
-    starts = problem.everywhere()  # not the fit to all records, which has seen what is left out
+    starts = problem.everywhere()  # starts exclude the fit to all records, which has seen the left-out part
     whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []
     for out in parts:
@@ -163,7 +164,7 @@ def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> L
         friction = [record.force - fit.mass * record.acceleration for record in problem.records]
         rest, size = (np.concatenate([row[mask] for row, mask in zip(rows, out, strict=True)])
                       for rows in ([row[0] for row in left], friction))  # fmt: skip
-        with np.errstate(invalid="ignore"):  # of a run that failed the rest is infinite
+        with np.errstate(invalid="ignore"):  # after a failed run the residual is infinite
             off = float(np.sqrt(np.mean((rest - rest.mean()) ** 2)) / size.std())
         errors.append(off if np.isfinite(off) else np.inf)
     return LawPrediction(whole, np.array(errors))

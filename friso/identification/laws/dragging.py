@@ -1,4 +1,4 @@
-"""Represent a log as a body dragged along the measured motion, with the friction force on it and that of a law."""
+"""Represent a log as a body dragged along the measured motion, and compute a law's friction on this body."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ from friso.stage.tables import friction_law
 class DraggedRecord:
     """A log as a body dragged along the measured motion.
 
-    Over time [s] it has the position [m] of the body on the bearing, shape (n,); low-passed, inside the record, the
-    force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass, shape (m,).
+    Over `time` [s] the record has the position [m] of the body on the bearing, shape (n,). Inside the record,
+    low-passed, shape (m,), it has the force [N] after the drive's delay and the acceleration [m/s^2] of the whole
+    moving mass.
     """
 
     name: str
@@ -39,7 +40,7 @@ class DraggedRecord:
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Return the low-passed friction force [N] of laws along the record, shape (runs, m).
 
-        The laws have one structure, given as flat keys to numbers or arrays of shape (runs,); runs that failed are NaN.
+        The laws have one structure; `flat` has their keys with numbers or arrays of shape (runs,). Failed runs are NaN.
         The bristles start unbent.
         """
         settings = LawSettings.current()
@@ -84,8 +85,7 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
     """Choose the parts to leave out in turn, by record, as masks of shape (m,).
 
-    Each record is left out as a whole, if there are at least `pieces` records; otherwise each is cut into equally many
-    pieces in time.
+    With at least `pieces` records, each is left out as a whole; otherwise each is cut into equally many pieces in time.
     """
     cuts = -(-pieces // len(records))
     parts = []

@@ -16,7 +16,7 @@ from friso.stage.tables import friction_law
 
 FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "viscous": 100.0, "stiffness": 30.0,
        "damping": 100.0}  # fmt: skip
-"""Numbers fitted for every law, and the factor by which they may differ from prior values."""
+"""Largest factor by which a fitted number may differ from its prior value. Every law has these numbers."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class LawProblem:
 
     @property
     def start(self) -> np.ndarray:
-        """Return the prior values of the numbers, shape (parameters,)."""
+        """Return the prior values of the fitted numbers (logarithms), shape (parameters,)."""
         settings = LawSettings.current()
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
@@ -66,7 +66,7 @@ class LawProblem:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return lower and upper bounds of the numbers, each of shape (parameters,)."""
+        """Return lower and upper bounds of the fitted numbers, each of shape (parameters,)."""
         far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
         centre = self.start[: len(far)]
         low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
@@ -89,13 +89,13 @@ class LawProblem:
         return law.shaped(measured, {name: value[name] for name in law.shape})
 
     def errors(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Return the residual force [N] of each record, about its mean, shape (rows, m); infinite for a failed run.
+        """Return the residual force [N] of each record about its mean, shape (rows, m).
 
-        The numbers have the shape (rows, parameters).
+        `rows` has fitted numbers, shape (rows, parameters). Residuals of a failed run are infinite.
         """
         columns = [self.keys(row) for row in rows]
         flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}
-        # numbers that decide on the equations are the same in all rows
+        # numbers that select the equations are equal in all rows
         flat |= {key: value[0] for key, value in flat.items() if key in friction_law(self.law).decisive}
         left = []
         for record in self.records:
@@ -113,7 +113,7 @@ class LawProblem:
         settings = LawSettings.current()
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
 
-        rows: dict[bytes, np.ndarray] = {}  # the residual with its derivatives: as many runs side by side cost one
+        rows: dict[bytes, np.ndarray] = {}  # residual and derivatives from runs side by side
 
         def at(numbers: np.ndarray) -> np.ndarray:
             if numbers.tobytes() not in rows:
@@ -150,9 +150,9 @@ class LawProblem:
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the weighted residuals of all records, shape (rows, samples); a large number for a failed run."""
+        """Return weighted residuals of all records, (rows, samples), large for a failed run."""
         settings = LawSettings.current()
-        with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0
+        with np.errstate(invalid="ignore"):  # a failed run may be infinite where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
         return np.nan_to_num(
             np.hstack(parts),

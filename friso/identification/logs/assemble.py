@@ -29,9 +29,9 @@ def read_log(
     needed: Sequence[str] = ("position",),
     foreign: Sequence[str] = (),
 ) -> Log:
-    """Read the log in a file: signals by role, SI, on one time base, with lines about doubtful parts.
+    """Read the log in a file: signals by role, in SI units, on one time base, with warnings.
 
-    With `strict`, every signal must be in the SI unit of its role, except those of the `foreign` roles; without, all
+    With `strict`, every signal must convert to the SI unit of its role, except for the `foreign` roles; without, other
     units are kept and listed in `Log.units`. `needed` are the roles that must be present; a position may be the
     integral of the velocity. Raises LogError (one message) for files that cannot be read or used.
     """
@@ -82,8 +82,8 @@ def _undecided(proposal: Proposal) -> list[str]:
 def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
     """Return each role's channel at even instants in the unit of the role.
 
-    A channel that was only proposed and that nobody needs is left out, with a warning, if it has no instants or no
-    unit; others raise LogError.
+    A channel that was proposed by its name and is not `needed` is left out, with a warning, if it lacks instants or a
+    unit. For other channels raises LogError.
     """
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
@@ -121,7 +121,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
-    """Return lines on the origin of the instants."""
+    """Write lines on the origin of the sample times."""
     if reading.mapping.sample_time is not None:
         return [
             f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
@@ -134,7 +134,7 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
 
 
 def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
-    """Make one track, with its lines added to the notes."""
+    """Bring one role's channel to even instants, and add its remarks to the notes."""
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
@@ -192,7 +192,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 
 
 def _lost(base: Track) -> list[str]:
-    """Return the number of lost samples in words."""
+    """Write how many samples were lost and interpolated."""
     if not base.bridged.any():
         return []
     places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
@@ -204,7 +204,7 @@ def _lost(base: Track) -> list[str]:
 
 
 def _spans(base: Track) -> str:
-    """Return the segments in words."""
+    """Describe the segments of a log in words."""
     parts = base.segments
     listed = ", ".join(f"{_instant(base, p.start)} to {_instant(base, p.stop - 1)}" for p in parts[:6])
     more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
@@ -213,6 +213,6 @@ def _spans(base: Track) -> str:
 
 
 def _instant(base: Track, number: int) -> str:
-    """Return the instant of a sample in words, with 0 for rounding at the beginning."""
+    """Write the time of a sample; rounding errors at the beginning become 0."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

@@ -1,9 +1,10 @@
 """Program that reads binary logs by the libraries of their formats, run by `friso.identification.logs.confined`.
 
-It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY CPU SECONDS``, the memory in
-bytes (0 for no limit), and the processor time [s], which not every system counts. It writes, pickled, the contents of
-the file as plain dicts, lists, texts, numbers and NumPy arrays, and the error message. It ends after these seconds
-whatever the library does, and at once when its standard input is closed because the parent was killed.
+The program imports nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY CPU SECONDS``, with
+the memory in bytes (0 for no limit), and the processor time [s], which not every system limits. The program writes a
+pickle with the contents of the file (plain dicts, lists, texts, numbers and NumPy arrays) and the error message. It
+ends after SECONDS whatever the library does, and at once when its standard input is closed because the parent was
+killed.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 MOST, PER_BYTE = 256 << 20, 16
-"""Most bytes of the contents: a fixed number plus a multiple of the size of the file."""
+"""Limit on the bytes of the contents: a fixed number, plus a multiple of the file's size."""
 
 
 def is_hdf5(head: bytes) -> bool:
@@ -38,7 +39,7 @@ def is_hdf5(head: bytes) -> bool:
 
 
 def mat_tree(path: Path) -> dict[str, Any]:
-    """Read the tree of a MAT file, by the names of its variables."""
+    """Read a MAT file of any version into a tree whose top level has the variables by name."""
     with path.open("rb") as file:
         head = file.read(520)
     return _read_hdf5(path) if is_hdf5(head) else _read_old(path)
@@ -50,13 +51,13 @@ def _object(kind: str) -> dict[str, str]:
 
 
 def _read_old(path: Path) -> dict[str, Any]:
-    """Read the tree of a file up to version 7."""
+    """Read the tree of a MAT file of format version 7 or older, by scipy."""
     from scipy.io import loadmat
 
     tree: dict[str, Any] = {}
     for name, value in loadmat(path, squeeze_me=True, struct_as_record=False).items():
         node = _from_scipy(value)
-        if str(name) == "None" and isinstance(node, dict) and OBJECT in node:  # scipy before 1.18 lost their names
+        if str(name) == "None" and isinstance(node, dict) and OBJECT in node:  # scipy before 1.18 lost such names
             name = value[0]["s0"].decode() if isinstance(value[0]["s0"], bytes) else "object"
         if not str(name).startswith("__"):
             tree[str(name)] = node
@@ -70,7 +71,7 @@ def _from_scipy(value: Any) -> Any:
     if hasattr(value, "_fieldnames"):
         return {key: _from_scipy(getattr(value, key)) for key in value._fieldnames}
     if type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-        named = {*(value.dtype.names or ())} & {"s2", "_Class"}  # of scipy before 1.18, and since
+        named = {*(value.dtype.names or ())} & {"s2", "_Class"}  # classes of scipy before 1.18 and since
         kind = value[0][named.pop()] if named else "function"
         return _object(kind.decode() if isinstance(kind, bytes) else str(kind))
     if isinstance(value, np.ndarray) and value.dtype == object:
@@ -83,7 +84,7 @@ def _from_scipy(value: Any) -> Any:
 
 
 def _read_hdf5(path: Path) -> dict[str, Any]:
-    """Read the tree of a file of version 7.3."""
+    """Read the tree of a MAT file of format version 7.3 (HDF5)."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -91,9 +92,9 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 
 
 def _own(group: Any, name: Any) -> Any:
-    """Return an item of a group.
+    """Return an item of an HDF5 group, and refuse links.
 
-    Raises ValueError for a link: it may lead to any file of the system, which the log would then show as its own.
+    Raises ValueError for a link, because it may lead to any file of the system.
     """
     import h5py
 
@@ -103,10 +104,10 @@ def _own(group: Any, name: Any) -> Any:
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
-    """Convert a group or data set into a tree of dict, list, array and str, with MATLAB's arrays transposed."""
+    """Convert an HDF5 group or data set into a tree of dict, list, array and str."""
     import h5py
 
-    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references lead to any data set
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references may lead to any data set
         raise ValueError(f"the values of {item.name} lie in another file")
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode() if isinstance(kind, bytes) else str(kind)
@@ -120,7 +121,7 @@ def _from_hdf5(item: Any, file: Any) -> Any:
     if item.attrs.get("MATLAB_empty", 0):
         return "" if kind == "char" else np.empty(0)
     most = most_bytes(file.id.get_filesize())
-    if item.nbytes > most:  # of which hardly anything is there
+    if item.nbytes > most:  # a sparse matrix is hardly filled
         raise ValueError(_too_much(item.nbytes, most))
     values = np.asarray(item[()])
     if kind == "char":
@@ -129,7 +130,7 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """Return a structure, or the structure array whose fields are lists of references."""
+    """Return a MATLAB structure, or a structure array, whose fields are lists of references."""
     import h5py
 
     references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
@@ -143,7 +144,7 @@ def _structures(item: Any, children: dict[str, Any]) -> Any:
 
 
 def uff_datasets(path: Path) -> dict[str, Any]:
-    """Read the datasets 58 of a universal file, and the codes of its units."""
+    """Read the datasets of type 58 of a universal file, and the code of its units."""
     import pyuff
 
     file: Any = pyuff.UFF(str(path))
@@ -168,7 +169,7 @@ def tdms_channels(path: Path) -> dict[str, Any]:
 
     heard, logger = _Heard(), logging.getLogger("nptdms")
     logger.handlers = [heard]
-    with path.open("rb") as opened:  # by its name the library would read the index beside it, whatever that is of
+    with path.open("rb") as opened:  # by name, it would read an index file
         file = nptdms.TdmsFile.read(opened)
     channels = [
         {
@@ -207,7 +208,7 @@ READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
 
 
 def _plain(node: Any) -> Any:
-    """Convert a tree into plain types, because subclasses would have to be trusted when unpickled."""
+    """Convert a tree into plain types, because the receiver unpickles no others."""
     if isinstance(node, dict):
         return {str(key): _plain(value) for key, value in node.items()}
     if isinstance(node, list | tuple):
@@ -236,8 +237,8 @@ def _end_with_parent() -> None:
 
 
 def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
-    """Read a file within bounds of memory [B], processor time [s] and time [s]."""
-    faulthandler.dump_traceback_later(seconds, exit=True)  # by a thread that needs no lock of the interpreter
+    """Read a file within limits of memory [B], processor time [s] and elapsed time [s]."""
+    faulthandler.dump_traceback_later(seconds, exit=True)  # this thread does not need the interpreter's lock
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if sys.platform != "win32":
         import resource
@@ -260,7 +261,7 @@ def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None
         message = "it needs too much memory"
     except RecursionError:
         message = "it is nested too deeply"
-    except Exception as error:  # the libraries let through whatever a broken file makes them stumble over
+    except Exception as error:  # the libraries raise any exception for a broken file
         message = str(error)[:500] or type(error).__name__
     sys.stdout.buffer.write(pickle.dumps((None, message)) if message else answer)
 

@@ -35,8 +35,8 @@ class Channel:
 class ChannelTable:
     """The channels of a file, under unique names (`unique`).
 
-    `scalars` are single numbers of the file by name, and `read` are lines about the reading (format, delimiter, decimal
-    sign, rows left out and why).
+    `scalars` are single numbers of the file by name, and `read` has lines on how the file was read (format, delimiter,
+    decimal sign, rows left out and why).
     """
 
     channels: tuple[Channel, ...]

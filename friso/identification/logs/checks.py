@@ -9,7 +9,7 @@ from friso.identification.logs.settings import LogSettings
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return a channel without samples that repeat the stamp [s] and value before, and their count.
+    """Drop samples that repeat the previous time stamp [s] and value, and count them.
 
     Raises LogError for decreasing time and for two values at one stamp.
     """
@@ -36,15 +36,15 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
 
 
 COUNTER_BITS = 64
-"""Most bits of a counter."""
+"""Largest number of bits of a counter."""
 
 
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
-    """Remove the overflow jumps from the whole numbers of a counter, and return its bits.
+    """Remove the overflow jumps from a counter's values, and return its number of bits.
 
-    Values without overflow are unchanged, with 0 bits. A counter of b bits jumps by nearly 2^b; every other step is
-    below 2^b/4, and with 2^b added the jump is at most twice as large as the other steps (a square wave fails this
-    test).
+    Values without overflow are unchanged, with 0 bits. A counter of b bits jumps by nearly 2^b while every other step
+    is below 2^b/4. With 2^b added, a jump must be at most twice as large as the other steps, which excludes square
+    waves.
     """
     finite = values[np.isfinite(values)]
     if finite.size < 3 or np.any(finite != np.round(finite)) or np.abs(finite).max() > 2.0**COUNTER_BITS:
@@ -95,9 +95,9 @@ def clipped_share(values: np.ndarray) -> float:
 
 
 def jumps(values: np.ndarray) -> tuple[float, int]:
-    """Return the largest step of a signal and the sample after it, if the step is no motion.
+    """Return the largest step of a signal, and the sample after it, if the step is a jump.
 
-    Such a step is many times larger than nearly all others; otherwise the result is 0 and 0.
+    A jump is many times larger than nearly all other steps. Returns (0, 0) without one.
     """
     settings = LogSettings.current()
     steps = np.diff(values)
@@ -144,10 +144,10 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Return measured velocity over the derivative of position by least squares, and their correlation.
+    """Return the ratio of measured velocity to the derivative of position, and their correlation.
 
-    Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11 samples. Returns NaN and 0 if
-    nothing can be compared.
+    The ratio is by least squares. Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11
+    samples. Returns NaN and 0 if nothing can be compared.
     """
     from scipy.signal import savgol_filter
 
@@ -172,7 +172,7 @@ _FACTORS = {
     np.pi / 180: "rad against deg",
     -1.0: "the sign",
 }
-"""Usual mistakes: velocity over the derivative of position, and what it means."""
+"""Usual mistakes: the ratio of velocity to the derivative of position, and the units that explain it."""
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:

@@ -23,7 +23,7 @@ CPU_SIGNAL = getattr(signal, "SIGXCPU", 0)
 
 
 def content(kind: str, path: Path) -> dict[str, Any]:
-    """Read the contents of a file of a `kind` of `friso.identification.logs.binary`.
+    """Read a binary log in a separate process; `kind` names a reader of `binary`.
 
     Raises LogError for a file that cannot be read within bounds of time, and of memory where the system has such limits
     (`LIMITS_MEMORY`).
@@ -32,9 +32,9 @@ def content(kind: str, path: Path) -> dict[str, Any]:
     return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
 
 
-@lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
+@lru_cache(maxsize=1)  # recognising a format and reading the file ask for one content
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    """Read a file, once for every change of it."""
+    """Read a file; the result is cached until the file changes."""
     settings = LogSettings.current()
     memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
     seconds = settings.time_of_reading + size / settings.speed_of_reading
@@ -49,7 +49,7 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
         raise broken(kind, f"reading it takes more than {seconds:.0f} s", path)
     try:
         read, message = _PlainUnpickler(io.BytesIO(answer)).load()
-    except Exception:  # whatever is wrong with what came, it is not what the reader writes
+    except Exception:  # any failure of unpickling means that the output is not the reader's
         raise broken(kind, "it makes the library crash", path) from None
     if read is None:
         raise broken(kind, message, path)

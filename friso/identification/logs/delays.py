@@ -25,10 +25,11 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Report the delay of the motion [m] behind the force [N], sampled every `period` [s]; "" for none.
+    """Report the delay of the motion [m] behind the force [N]; "" for none.
 
-    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant, because with
-    acceleration alone friction or a spring would look like a delay. The lag with the smallest residual counts.
+    Both are sampled every `period` [s]. For each lag the force is fitted by acceleration, velocity, its sign, position
+    and a constant, because with acceleration alone friction or a spring would look like a delay. The lag with the
+    smallest residual counts.
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     place, velocity, acceleration = (_smoothed(position[part], order, period) for order in (0, 1, 2))
@@ -41,8 +42,8 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
 def lag(first: np.ndarray, second: np.ndarray) -> float:
     """Return by how many samples the second signal lags behind the first.
 
-    It is the peak of their cross-correlation, interpolated by a parabola; NaN if its height is below 0.5 or it lies at
-    the border of the search.
+    The lag is at the peak of the cross-correlation, interpolated by a parabola; NaN if the peak is below 0.5 or at a
+    border of the search.
     """
     longest = LogSettings.current().longest_delay_samples
     first, second = first - first.mean(), second - second.mean()
@@ -75,7 +76,7 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
 
 def _peak(heights: np.ndarray) -> float:
-    """Return the place of the highest value, by a parabola through three values; NaN if below 0.5 or at an end."""
+    """Return the index of the peak, by a parabola through three values; NaN if it is unclear."""
     i = int(np.argmax(heights))
     if heights[i] < 0.5 or i in (0, heights.size - 1):
         return np.nan
@@ -104,9 +105,10 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """Return an estimate in samples in words, "" if the motion does not show a delay.
+    """Write an estimated delay, given in samples; "" if the motion does not show a delay.
 
-    This is the case if its interval contains 0, it is below a quarter of a sample, or the blocks differ by samples.
+    A delay does not show if its interval contains 0, if it is below a quarter of a sample, or if blocks differ by
+    samples.
     """
     value, half = estimate
     if not np.isfinite(value) or abs(value) <= max(half, LogSettings.current().shortest_delay_samples) or half > 1:
@@ -119,7 +121,7 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Return the smoothed derivative of an order, without the ends; of few values all of them."""
+    """Return the smoothed derivative of an order, without its distorted ends."""
     settings = LogSettings.current()
     from scipy.signal import savgol_filter
 

@@ -35,9 +35,9 @@ class LogFormat:
     """A format of logs: its `title`, how it is recognised, and the reader of its channels.
 
     Formats are tried by rank: 0 for those recognised by their first bytes, 1 by their first lines, 2 for any text.
-    `units`: it can contain units; `times`: its channels come with their instants, so that no time column is needed. A
-    file that `holds_response` contains a frequency response instead of signals over time, which `read_response` reads.
-    Readers raise LogError.
+    `units` tells whether files can contain units; `times` whether channels come with their instants, so that no time
+    column is needed. `holds_response` tells whether a file contains a frequency response instead of signals over time,
+    which `read_response` reads. Readers raise LogError.
     """
 
     title: str

@@ -1,6 +1,6 @@
 """Collect all missing information about a log, with the options that supply it.
 
-Missing may be channels for roles, units, or the sample time.
+Channels for roles, units, or the sample time may be missing.
 """
 
 from __future__ import annotations
@@ -45,13 +45,14 @@ OPTIONAL = ("velocity", "acceleration")
 """Roles that no analysis needs; with several candidates they stay empty."""
 
 _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
-"""Letters with which channels of a role often begin, to choose the example of a message."""
+"""First letters that are usual for channels of a role, for choosing the example in a message."""
 
 
 class GapsError(LogError):
     """Error with all information that is missing for reading logs.
 
-    Each single error names the option that supplies it as its example. `proposed` has the proposed channels by role.
+    The example of each single error is the option that supplies the missing information. `proposed` has the proposed
+    channels by role.
     """
 
     def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
@@ -74,12 +75,12 @@ class GapsError(LogError):
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Return the options that supply everything, each once, quoted for a shell."""
+        """Return the options that supply all missing information, each once, quoted for a shell."""
         return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
 
 
 def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> list[MotionReading]:
-    """Read channels without a role as force and motion, where names leave these open.
+    """Find force and motion by mechanics among channels, where names leave these roles open.
 
     Returns the best reading, then others that explain the force about as well; [] if nothing is open, or if no reading
     explains the force.
@@ -91,7 +92,7 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     taken = [choice.channel for choice in chosen.values()]
 
     def candidates(role: str) -> list[Channel]:
-        """Return the candidates for a role: its channel, its rivals, or the channels that fit it."""
+        """List the candidates for a role: its channel, its rivals, or else the channels that fit."""
         if role in chosen:
             return [chosen[role].channel]
         every = rivals.get(role) or [channel for channel, _ in _fitting(role, table, taken)]
@@ -158,7 +159,7 @@ def check_gaps(
 def _by_mechanics(
     role: str, readings: Sequence[MotionReading], channels: Sequence[Channel]
 ) -> tuple[Channel | None, str] | None:
-    """Return the channel that mechanics suggests for a role, and the reason; None if it suggests nothing.
+    """Return the channel that mechanics suggests for a role, and the reason; None without one.
 
     The channel is None if two readings are about equally good.
     """
@@ -178,7 +179,7 @@ def _by_mechanics(
 
 
 def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: bool) -> list[LogError]:
-    """Return the gaps of units, which are those of a rotary axis where units or names tell that the axis turns.
+    """List missing units; if units or names tell that the axis turns, units of a rotary axis.
 
     A force that acts `against` the motion that it causes gets a negative scale as its example.
     """
@@ -201,10 +202,10 @@ def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: boo
 
 
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
-    """Return the channel that fits a role best, and the reason if several are alike; None if no channel fits.
+    """Return the channel that fits a role best (None without one), and the reason if unclear.
 
-    It fits by unit and first letter, among channels that change and have no other role. A force never follows the
-    position, as a reference does.
+    Channels are compared by unit and first letter, if they change and have no other role. A channel that follows the
+    position, as a reference does, is no force.
     """
     fits = _fitting(role, table, taken.values())
     if role == "force":
@@ -220,7 +221,7 @@ def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> 
 def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
     """Return the candidates for a role, with the quality of their fit, the best first.
 
-    They must have as many samples as most channels.
+    Candidates must have as many samples as most channels.
     """
     used = {id(channel) for channel in taken}
     usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
@@ -236,20 +237,20 @@ def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[t
 
 
 def _kinds(role: str) -> tuple[str, ...]:
-    """Return the units in which a role may stand, those of a rotary axis among them."""
+    """Return the units that a role may have on a linear or rotary axis."""
     return ROLES[role], *OTHERS.get(ROLES[role], ())
 
 
 def _is_of_another(role: str, unit: str) -> bool:
-    """Tell whether a unit belongs to another quantity that no scale converts, such as rpm for a position."""
+    """Tell whether a unit is of another quantity, such as rpm for a position."""
     others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Choose the measured one among channels that move like the best candidate, with the reason.
+    """Choose the measured channel among channels that move alike, with the reason.
 
-    It is the only one whose name says that it was measured, or the noisiest. Returns None if that cannot be decided.
+    The measured channel is the only one whose name says so, or the noisiest. The channel is None if that is unclear.
     """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role not in KINDS or len(alike) == 1:
@@ -285,17 +286,17 @@ def _are_alike(one: Channel, other: Channel) -> bool:
 
 
 def _noise(channel: Channel) -> float:
-    """Return the noise of a channel relative to its range, by its fourth differences, which hardly contain motion."""
+    """Return a channel's noise relative to its range, by fourth differences."""
     finite = channel.values[np.isfinite(channel.values)]
     with np.errstate(all="ignore"):
         return float(np.std(np.diff(finite, 4)) / np.ptp(finite))
 
 
 def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
-    """Return how well a channel fits a role, as a tuple to compare.
+    """Rate how well a channel fits a role, as a tuple to compare.
 
-    It counts whether the channel changes (but not as a clock does), its unit, whether it was commanded or measured, and
-    its first letter.
+    The tuple rates whether the channel changes (but not like a clock), its unit, whether it was commanded or measured,
+    and its first letter.
     """
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0) and not is_ramp(channel)
@@ -306,7 +307,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
-    """Return the missing information on the instants of channels."""
+    """List missing information on the sample times of channels."""
     if "time" in proposal.rivals:
         return []
     for choice in choices:

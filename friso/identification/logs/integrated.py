@@ -16,7 +16,7 @@ NOTE = (
     "position: the integral of the velocity, since no channel holds one; where the log begins counts as 0, after a gap "
     "as well, an offset of the velocity becomes a drift, and the first micrometres of a motion are not resolved"
 )
-"""Note on a position that is the integral of the velocity."""
+"""Remark in the log on a position that is the integral of the velocity."""
 
 LENGTHS = ("m", "rad")
 """Units of a position."""
@@ -27,8 +27,8 @@ def is_needed(
 ) -> bool:
     """Tell whether a needed position must be the integral of the velocity.
 
-    No channel has that role or could have it, unless the user assigned the velocity and no position, or the `best`
-    reading by mechanics has a velocity.
+    It must be if no channel is or could be a position, if the user assigned a velocity and no position, or if the
+    `best` reading by mechanics has a velocity.
     """
     velocity = proposal.chosen.get("velocity")
     if "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
@@ -45,7 +45,7 @@ def is_needed(
 def _may_be_a_position(channel: Channel) -> bool:
     """Tell whether a channel may be a position.
 
-    It has no role yet, a fitting unit or none, and it changes.
+    Such a channel has no role yet, changes, and has a fitting unit or none.
     """
     finite = channel.values[np.isfinite(channel.values)]
     if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None or is_ramp(channel):

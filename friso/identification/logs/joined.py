@@ -44,7 +44,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
 
 
 def join_alike(logs: Sequence[Log]) -> list[Log]:
-    """Return the logs, with joinable ones joined."""
+    """Join logs that are joinable, and return the others as they are."""
     groups: list[list[Log]] = []
     for log in logs:
         alike = next((group for group in groups if joinable(group[0], log)), None)

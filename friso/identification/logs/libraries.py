@@ -25,7 +25,7 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Return a line on channels with fewer samples than their truncated file states."""
+    """Write a line on channels that have fewer samples than the (truncated) file states."""
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)
@@ -36,7 +36,7 @@ def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> li
 def filled_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
     """Make a table of the channels with samples.
 
-    Raises LogError for none.
+    Raises LogError if no channel has samples.
     """
     filled = tuple(channel for channel in channels if channel.values.size)
     if not filled:

@@ -19,9 +19,9 @@ ROLES: Mapping[str, str] = {
     "cart_position": "m",
     "relative_position": "m",
 }
-"""Roles of channels, with the SI unit of each on a linear axis. `position` and `velocity` are those of the stage (the
-controlled body), `cart_position` that of the cart; `relative_position` is position minus cart position; `force` is
-the actuator's, from a current or a voltage by a scale, including any `disturbance` that is added to the controller's
+"""Roles of channels, with the SI unit of each on a linear axis. `position` and `velocity` are the stage's (the
+controlled body), `cart_position` is the cart's; `relative_position` is position minus cart position; `force` is the
+actuator's, from a current or a voltage by a scale, including any `disturbance` that is added to the controller's
 output."""
 
 
@@ -68,13 +68,13 @@ class Log:
         return max(self.segments, key=lambda part: part.stop - part.start)
 
     def measured(self, part: slice) -> np.ndarray:
-        """Return 1 at measured samples of a stretch, shape (k,), and 0 at samples that were lost."""
+        """Return 1 at measured and 0 at lost samples of a stretch, shape (k,)."""
         return np.ones(part.stop - part.start) if self.bridged is None else 1.0 - self.bridged[part]
 
     def excerpt(self, count: int) -> Log:
-        """Return at most so many samples of the longest stretch without gaps: those with the longest travel.
+        """Return the `count` samples with the longest travel, from the longest stretch without gaps.
 
-        If the stretch is no longer than that, the whole log is returned.
+        If the stretch has no more than `count` samples, the whole log is returned.
         """
         part = self.longest
         if part.stop - part.start <= count:
@@ -88,7 +88,7 @@ class Log:
         return replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, is_excerpt=True)
 
     def per_unit_of_force(self) -> Log:
-        """Return the log with its force in its own unit, if that is not a unit of force."""
+        """Return the log with its force in the logged unit (such as amperes), if that is no force."""
         unit = self.units.get("force")
         if unit is None:
             return self
@@ -96,5 +96,5 @@ class Log:
         return replace(self, axis=self.axis.per(unit), units=units)
 
     def unit(self, role: str) -> str:
-        """Return the unit of a role's signal: the linear-axis unit, unless it could not be converted."""
+        """Return the unit of a role's signal: SI on a linear axis, unless it could not be converted."""
         return self.units.get(role, ROLES[role])

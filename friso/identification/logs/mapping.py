@@ -32,9 +32,9 @@ _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 class Mapping:
     """The user's statements about a log.
 
-    They are roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time
-    [s] if the file states none, and the kinds of experiment and axis; `setup` has the keys with which the stage was set
-    up differently for this log ({dotted key: "8 mm"}).
+    Fields are roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample
+    time [s] if the file states none, and the kinds of experiment and axis. `setup` has stage-file keys that had other
+    values for this log ({dotted key: "8 mm"}).
     """
 
     roles: Table[str, str] = field(default_factory=dict)
@@ -51,7 +51,7 @@ class Mapping:
         return LINEAR if self.axis is None else KINDS[self.axis]
 
     def over(self, older: Mapping) -> Mapping:
-        """Return this mapping, completed by an older one."""
+        """Return this mapping, completed by statements of an older one."""
         rest = older.beside(self)
         return Mapping(
             {**rest.roles, **self.roles},
@@ -128,7 +128,7 @@ def from_options(
 ) -> Mapping:
     """Make a mapping from the texts of options.
 
-    They are those of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`, `--axis rotary`.
+    The options are `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`, `--axis rotary`.
     Raises LogError.
     """
     roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
@@ -160,7 +160,7 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """Return the assumption of an example, and its consequence, to be checked before the example is copied."""
+    """Write the assumption behind an example, to be checked before copying the example."""
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 
@@ -170,7 +170,7 @@ def option(name: str, left: str, right: str) -> str:
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:
-    """Return the file for the mapping of a log: beside the log, or in a folder.
+    """Return the path of a log's mapping file, beside the log or in a folder.
 
     In a folder, logs with equal names from several folders, and those whose long names begin alike, have separate
     files.
@@ -204,7 +204,7 @@ def mapping_text(mapping: Mapping) -> str:
 def place_for(log: Path, folder: Path) -> Path:
     """Return a writable place for a log's mapping: beside it, or else the folder.
 
-    A read-only folder counts as such even for a superuser.
+    A folder marked read-only is not used, even for a superuser.
     """
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
@@ -212,12 +212,12 @@ def place_for(log: Path, folder: Path) -> Path:
 
 
 def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
-    """Load the mapping beside a log, or else in the folder; None without one.
+    """Load the mapping file beside a log, or else in the folder; None if there is none.
 
     Raises LogError for a file that is not a mapping.
     """
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
-        if os.path.isfile(place):  # nor is there one whose name would be too long
+        if os.path.isfile(place):  # a file whose name would be too long does not exist either
             return _parsed(place)
     return None
 

@@ -38,7 +38,7 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """Return the kind of a column by its heading; None if it is no part of a response.
+    """Return the kind of a response's column by its heading; None for other columns.
 
     Text before brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
     """
@@ -50,14 +50,14 @@ def column_kind(name: str) -> str | None:
 def is_response(names: Iterable[str]) -> bool:
     """Tell whether headings describe a frequency response.
 
-    They have a frequency, and magnitude with phase or real with imaginary part.
+    The headings must name a frequency, and magnitude with phase or real with imaginary part.
     """
     kinds = {column_kind(name) for name in names}
     return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
 
 
 def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
-    """Make a response of the columns of a table.
+    """Build a frequency response from the columns of a table.
 
     Raises LogError.
     """
@@ -91,7 +91,7 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
         response, scale, unit, quantities = _polar(columns["magnitude"], columns["phase"], path)
     coherence = columns["coherence"].values if "coherence" in columns else None
     read = (*table.read, quantities, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
-    with np.errstate(all="ignore"):  # what is no number is told below
+    with np.errstate(all="ignore"):  # NaN is reported below
         response = response * scale
     return check_response(MeasuredResponse(frequency, response, coherence, path.stem, read, unit), path)
 
@@ -109,7 +109,7 @@ def _frequency(column: Channel, path: Path) -> np.ndarray:
 
 
 def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
-    """Make a response of magnitude and phase, with its scale, unit and words.
+    """Build complex values from magnitude and phase; return them with scale, unit and words.
 
     Raises LogError for a phase without a unit.
     """
@@ -140,7 +140,7 @@ def response_unit(text: str) -> tuple[float, str, str]:
 
 
 def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
-    """Return a response without its line at 0 Hz, checked.
+    """Check a response, and return it without its line at 0 Hz.
 
     Raises LogError for too few or falling frequencies and NaN.
     """
@@ -168,7 +168,7 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
 
 
 def _of_position(measured: MeasuredResponse) -> MeasuredResponse:
-    """Return a response of velocity or acceleration as one of position."""
+    """Convert a response of velocity or acceleration to a response of position."""
     rate = re.fullmatch(r"(?P<place>m|rad)/s(?P<twice>\^2)?/(?P<force>.+)", measured.unit)
     if rate is None:
         return measured

@@ -1,8 +1,8 @@
 """Find force and motion among channels by mechanics: a force accelerates a mass and overcomes its friction.
 
 Each pair of channels is read as force and position, and as force and velocity: force = M a + F_v v + F_c sign(v) +
-offset is fitted at several time scales, without units, because a factor changes nothing. In the right reading little of
-the force is left on any scale, and inertia and friction have equal signs.
+offset is fitted at several time scales, without units, because a factor changes nothing. With the right channels, the
+fit leaves little of the force on any scale, and inertia and friction have equal signs.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ class MotionReading:
     doubt: int = 0
 
     def channel(self, role: str) -> Channel | None:
-        """Return the channel that this reading gives a role; None if it has no such role."""
+        """Return the channel to which this reading gives a role; None for other roles."""
         return self.force if role == "force" else self.motion if role == self.kind else None
 
 
 def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, str]]) -> list[MotionReading]:
-    """Read every force with every motion, each a channel and its kind, the best reading first.
+    """Fit every force with every motion (a channel and its kind); the best reading comes first.
 
-    Readings that mechanics refutes come last. Before them come those in which the force opposes the motion, or is
-    proportional to velocity or acceleration alone: one may be the reference or the derivative of the other.
+    Readings that mechanics refutes come last; before them, readings in which the force opposes the motion, or is
+    proportional to velocity or acceleration alone (one channel may be the reference or the derivative of the other).
     """
     signals = {id(channel): _filled(channel) for channel in (*forces, *(motion for motion, _ in motions))}
     readings = []
@@ -62,9 +62,9 @@ def motion_readings(forces: Sequence[Channel], motions: Sequence[tuple[Channel, 
 
 
 def with_positions_first(readings: Sequence[MotionReading]) -> list[MotionReading]:
-    """Return readings with those of positions first whose derivative is the velocity of the best reading.
+    """Move a position first whose derivative is the velocity of the best reading.
 
-    The position tells what its derivative tells, and the micrometres in which bristles bend.
+    A position contains all that its derivative contains, and also the micrometres of bending bristles.
     """
     best, refuted = readings[0], LogSettings.current().share_left_by_a_reading
     as_good = [one for one in readings if one.doubt == best.doubt and one.unexplained <= refuted]
@@ -73,7 +73,7 @@ def with_positions_first(readings: Sequence[MotionReading]) -> list[MotionReadin
 
 
 def _is_integral(one: MotionReading, best: MotionReading) -> bool:
-    """Tell whether the motion of a reading is a position, and its derivative the velocity of the best reading."""
+    """Tell whether a reading's position has the best reading's velocity as its derivative."""
     signals = [_filled(one.motion), _filled(best.motion)]
     if one.kind != "position" or best.kind != "velocity" or any(signal is None for signal in signals):
         return False
@@ -119,7 +119,7 @@ def leads(one: Channel, other: Channel) -> bool:
 
 
 def _filled(channel: Channel) -> np.ndarray | None:
-    """Return a channel's values with lost ones interpolated; None if few or constant."""
+    """Return a channel's values with lost samples interpolated; None if few or constant."""
     finite = np.isfinite(channel.values)
     if finite.sum() < LogSettings.current().samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
         return None
@@ -149,7 +149,7 @@ def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, mov
 
 
 def _fitted(values: np.ndarray, moved: np.ndarray, kind: str) -> tuple[float, float, float, float] | None:
-    """Fit one time scale; None if hardly anything moves.
+    """Fit inertia and friction at one time scale; None if hardly anything moves.
 
     Returns the remaining fraction of the variance, the sizes of inertia and friction with their signs, and the
     correlation of the force with the velocity.

@@ -26,8 +26,8 @@ _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)
 class Preamble:
     """Information from the lines above a table.
 
-    It has the sampling `interval` [s], if a line states it with its unit; numbers without a unit by name; units by the
-    name of the column; and lines about what was read.
+    Fields are the sampling `interval` [s], if a line states it with its unit; numbers without a unit, by name; units by
+    column name; and lines on what was read.
     """
 
     interval: float | None = None
@@ -91,7 +91,7 @@ def _pair(line: str) -> tuple[str, str] | None:
 
 
 def _seconds(number: float, unit: str) -> float | None:
-    """Return a sample time, or rate, in seconds; None for another unit or if not positive."""
+    """Convert a sample time or rate to seconds; None for another unit or if not positive."""
     for si, power in (("s", 1), ("Hz", -1)):
         if number > 0 and unit and (size := unit_factor(unit, si)) is not None:
             return (number * size) ** power
@@ -105,7 +105,7 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
         listed = _OF_UNITS.fullmatch(key) is not None
         cells = re.split(r"\s*[;,\t]\s*|\s+", value) if listed else line.lstrip("#% ").split(delimiter)
         cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
-        if listed and key.lower().startswith(("vertical", "y ")) and len(cells) == len(names) - 1:  # but of the first
+        if listed and key.lower().startswith(("vertical", "y ")) and len(cells) == len(names) - 1:  # the first has none
             cells = [_horizontal(lines), *cells]
         units = [cell.strip(' []()"') for cell in cells]
         stated = [unit for unit in units if unit and unit != "-"]

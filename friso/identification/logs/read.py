@@ -23,26 +23,27 @@ _OTHERS = {
     b"#ROSBAG": ("a bag of ROS", "one of its topics saved as CSV"),
     b"SQLite format 3": ("a data base of SQLite, as a bag of ROS 2 is", "one of its topics saved as CSV"),
 }
-"""First bytes of files of other kinds, with their names and the files to use instead."""
+"""First bytes of files that are no logs, with their kind and the advice on what to use instead."""
 
 
 def file_format(path: Path) -> str:
-    """Return the format of a file by its content, a name of `FORMATS`.
+    """Recognise the format of a file by its content, and return its name in `FORMATS`.
 
-    Raises LogError for what cannot be read: missing, a folder, empty, too large, no text and no known format.
+    Raises LogError for a path that is missing or a folder, and for a file that is empty, too large, or of no known
+    format.
     """
     settings = LogSettings.current()
     try:
         if path.is_dir():
             raise LogError("log", "a folder", "a file", "friso identify log.csv", str(path))
-        if path.exists() and not path.is_file():  # a device or a pipe may never end, or never begin
+        if path.exists() and not path.is_file():  # reading a device or a pipe may never end, or never begin
             raise LogError("log", "a device, pipe or socket", "a file", "friso identify log.csv", str(path))
         size = path.stat().st_size
         with once_free(partial(path.open, "rb")) as file:
             head = FileHead(path, file.read(520))
     except LogError:
         raise
-    except (OSError, ValueError) as error:  # a name that no file has
+    except (OSError, ValueError) as error:  # the name is too long for any file
         reason = cause_of(error) if isinstance(error, OSError) else "no name of a file"
         raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None
     if size == 0:
@@ -79,7 +80,7 @@ def is_frequency_response(path: Path | str) -> bool:
 
 
 def read_frequency_response(path: Path | str) -> MeasuredResponse:
-    """Read the frequency response in a file of a format that can hold one.
+    """Read the frequency response in a file.
 
     Raises LogError.
     """

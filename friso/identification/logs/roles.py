@@ -1,4 +1,4 @@
-"""Assign roles to channels: by the user, or proposed by name or unit with a reason, never guessed between two."""
+"""Assign roles to channels: as the user said, or by name or unit with a reason; ambiguous roles stay open."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _KEYS, _CURRENTS, _OTHERS_WANTED, MEASURED = (
 )
 
 _LETTERS = frozenset("vfinw")
-"""Letters of commanded quantities other than a position, directly before the word for commanded: v_soll."""
+"""Symbols of commanded quantities other than a position, when directly before the word for commanded: v_soll."""
 
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
 """Units that imply a role if a single channel without a role has them."""
@@ -88,7 +88,7 @@ def _compound(word: str) -> list[str]:
 
 
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
-    """Return the role of a name, and the word that shows it; None if it shows none.
+    """Return the role that a name implies, and the word that implies it; None without one.
 
     The `unit` distinguishes a symbol from the name of an axis: V_soll in mm, v_ist in mm/s.
     """
@@ -117,7 +117,7 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
 
 
 def wanted_of(name: str, unit: str = "") -> bool:
-    """Tell whether a name is that of a commanded speed, acceleration or force: rpm_ref."""
+    """Tell whether a name denotes a commanded speed, acceleration or force: rpm_ref."""
     parts = words(name)
     rate = any(part in _KEYS[role] for part in parts for role in ("velocity", "acceleration"))
     return bool({*parts} & _SET) and (rate or _has_unit_of(unit, _RATES)) and role_of(name, unit) is None
@@ -135,7 +135,7 @@ def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
 
 
 def _has_unit_of(unit: str, kinds: Sequence[str]) -> bool:
-    """Tell whether a unit is one of some kinds."""
+    """Tell whether a unit converts to one of the units in `kinds`."""
     return bool(unit) and any(unit_factor(unit, kind) is not None for kind in kinds)
 
 
@@ -165,7 +165,7 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
 
 
 def _nearest(table: ChannelTable, name: str, role: str) -> str:
-    """Return the name of the channel that a misspelled name probably means.
+    """Return the name of the channel that a misspelled `name` probably means.
 
     Channels of the role come first, then all others except clocks.
     """
@@ -179,7 +179,7 @@ def _nearest(table: ChannelTable, name: str, role: str) -> str:
 def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
     """Return a list of the channels for a message, without those `taken` for other roles.
 
-    It also names what was left out as objects.
+    The list also names MATLAB objects that were left out.
     """
     used = {id(channel) for channel in taken}
     labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels if id(c) not in used]
@@ -199,8 +199,8 @@ class Proposal:
 def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
     """Give roles to channels: as the user assigned them, then by names, then by units.
 
-    Of several channels whose names show a role, the one whose name has no other word gets it. Raises LogError for an
-    assigned name that is not there.
+    Of several channels whose names imply a role, the channel whose name has no other word gets it. Raises LogError for
+    an assigned channel that does not exist.
     """
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
@@ -242,7 +242,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
 
 
 def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
-    """Return the only channel in a unit of the role whose name says nothing, or None."""
+    """Return the only channel in a unit of the role and with an uninformative name, or None."""
     used = {id(channel) for channel in taken}
     fits = [
         channel
@@ -279,6 +279,6 @@ def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, 
 
 
 def _own_times(table: ChannelTable) -> bool:
-    """Tell whether channels other than time channels have instants from the file."""
+    """Tell whether the file itself gives instants to channels other than clocks."""
     others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
     return any(channel.time is not None for channel in others)

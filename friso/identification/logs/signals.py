@@ -34,7 +34,7 @@ _TURNED = {ROTARY.unit(unit) for unit in ROLES.values()} - {*ROLES.values()}
 
 @dataclass
 class Notes:
-    """Lines about a log, and units that differ from those of the roles, collected while it is read."""
+    """Remarks and unconverted units, collected while a log is read."""
 
     read: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -45,8 +45,8 @@ class Notes:
 class Reading:
     """Rules for reading channels: the table, the user's mapping, and the accepted units.
 
-    `strict`: only the units of the roles are accepted; `bare`: the file is of a kind without units; `origin` is the
-    path, and `foreign` are roles that may have another unit all the same (a force in volts).
+    With `strict`, only units that convert to the roles' are accepted, except for `foreign` roles (a force in volts).
+    `bare` tells that the file's format has no units; `origin` is the path.
     """
 
     table: ChannelTable
@@ -57,7 +57,7 @@ class Reading:
     foreign: tuple[str, ...] = ()
 
     def unit(self, role: str) -> str:
-        """Return the SI unit of a role on the axis that was logged."""
+        """Return the SI unit of a role on the logged axis, linear or rotary."""
         return self.mapping.axis_kind.unit(ROLES[role])
 
     def takes(self, role: str, si: str) -> bool:
@@ -79,7 +79,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
                 "unit", quoted(unit), "a unit such as mm, um, rad, V, A or counts", option("--unit", name, "mm"), origin
             )
     channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
-    if not times:  # they come from its columns
+    if not times:  # times come from the table's columns
         channels = [replace(channel, time=None) for channel in channels]
     timed = zip(channels, with_times(channels), strict=True)
     timed_channels = tuple(new if old.time is None else old for old, new in timed)
@@ -92,7 +92,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     Raises LogError.
     """
     channel, role = choice.channel, choice.role
-    values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
+    values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoder counters overflow
     if bits:
         notes.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
     scale = reading.mapping.scales.get(role)
@@ -118,7 +118,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
                 raise _wrong_unit(choice, unit, si, reading)
             notes.units[role] = si
     notes.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
-    with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
+    with np.errstate(all="ignore"):  # NaN is left to the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     if most > LogSettings.current().largest_value:
@@ -128,7 +128,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
 
 
 def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, str]:
-    """Return the factor of a scale and the unit that it implies."""
+    """Return the factor of a scale, and the unit of the scaled values."""
     try:
         return read_scale(role, scale, unit, reading.mapping.axis_kind)
     except InputError as error:
@@ -136,7 +136,7 @@ def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, 
 
 
 def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
-    """Return the error that names what a conversion to the unit of the role needs; None if it needs nothing.
+    """Return the error for a missing or wrong unit of a channel; None if its unit fits.
 
     Raises LogError for a scale that does not fit.
     """
@@ -152,16 +152,16 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
     """Tell whether a channel without a unit is taken as SI.
 
-    The user assigned it, the format has no units, and it is no current in place of a force.
+    It is if the user assigned it, the format has no units, and it is no current in place of a force.
     """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)
 
 
 def turning_names(choices: Sequence[AssignedRole]) -> list[str]:
-    """Return the names that tell of angles or torques, of channels without a unit.
+    """List names of channels without a unit that imply angles or torques.
 
-    There are none where a channel of the motion has a unit: that tells by itself whether the axis turns.
+    The list is empty if a motion channel has a unit, which tells whether the axis turns.
     """
     has_unit = any(choice.channel.unit and LENGTH in ROLES[choice.role] for choice in choices)
     bare = [choice.channel.name for choice in choices if not choice.channel.unit and not has_unit]
@@ -176,7 +176,7 @@ def _electric_unit(choice: AssignedRole) -> str:
 
 
 def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
-    """The error for a channel whose unit is none of the role's kind, or that has none."""
+    """Build the error for a channel whose unit does not fit its role or is missing."""
     role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
         usual, travel = _likely_length(choice.channel, wanted)
@@ -197,7 +197,7 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
     scale = f"{wanted}/({si})" if "/" in si else f"{wanted}/{si}"
     expected = f'a scale to {wanted}, such as --scale {role}="{number} {scale}"'
-    example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
+    example = f'--scale {role}="NUMBER {scale}"'  # an invented scale could be copied by mistake
     if si == ROTARY.unit(wanted) and LENGTH in ROLES[role]:
         expected, example = f"{expected}; or {TURNS} for an axis that turns", TURNS
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
@@ -227,7 +227,7 @@ def _span(values: np.ndarray) -> str:
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
-    """Return the instants of a channel [s] from the user's sample time, a time channel, or the file; None without any.
+    """Return the instants of a channel [s]; None if nothing states them.
 
     Raises LogError.
     """
@@ -244,7 +244,7 @@ def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading,
 
 
 def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
-    """Return the seconds in the unit of the time channel.
+    """Return how many seconds the unit of the time channel has.
 
     Raises LogError for none.
     """
@@ -264,7 +264,7 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
 
 
 def _likely_unit(clock: Channel) -> tuple[str, str]:
-    """Return the unit in which a time channel's steps are typical of logs (0.1 ms to 100 ms), and the step in words."""
+    """Return the likely unit of a time channel, and its time step in words."""
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
     unit, size = ("s", 1e3) if step <= 0.1 else ("ms", 1.0) if step <= 100 else ("us", 1e-3)
@@ -273,7 +273,7 @@ def _likely_unit(clock: Channel) -> tuple[str, str]:
 
 
 def no_time(channel: Channel, reading: Reading) -> LogError:
-    """The error for a channel without instants."""
+    """Build the error for a channel without instants."""
     offers = _offers(reading.table)
     expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
     offer = re.match(r'--dt "[^"]*"', offers)
@@ -292,12 +292,12 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
 
 
 def _may_be_a_clock(channel: Channel) -> bool:
-    """Tell whether a channel may be a clock: rising in a unit of time, or even without a unit, but no counter."""
+    """Tell whether a channel may be a clock: rising, in a unit of time or none, and no counter."""
     return is_clock(channel) or (not channel.unit and is_ramp(channel) and not is_counter(channel))
 
 
 def _offers(table: ChannelTable) -> str:
-    """Return which single numbers in the file could be the sample time; they are not used."""
+    """Write which single numbers in the file could be the sample time; none is used unasked."""
     offers = []
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower().replace("_", "")

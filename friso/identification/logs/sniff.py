@@ -17,7 +17,7 @@ from friso.identification.logs.settings import LogSettings
 from friso.identification.logs.units import is_unit, split_heading
 
 REMEMBERED = 4
-"""Files whose layout is cached, because each is examined several times."""
+"""Number of files whose layout is cached, because each file is examined several times."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Pairs of delimiter and decimal sign; of two that fit equally well the first is taken."""
@@ -37,8 +37,8 @@ STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
 class TextLayout:
     """Layout of a text.
 
-    `first` counts the lines before the numbers, `above`; `names` and `units` are per column; `exact`: every delimiter
-    ends a cell, so that several spaces are empty cells.
+    `first` is the number of lines before the numbers, and `above` has these lines; `names` and `units` are per column.
+    With `exact` every delimiter ends a cell, so that several spaces are empty cells.
     """
 
     encoding: str
@@ -90,7 +90,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
     if not encoding:
         encoding = "utf-8"
         try:
-            codecs.getincrementaldecoder("utf-8")().decode(head)  # the last character may be cut
+            codecs.getincrementaldecoder("utf-8")().decode(head)  # the last character may be cut off
         except UnicodeDecodeError:
             encoding = "cp1252"
     text = codecs.getincrementaldecoder(encoding)("replace").decode(head).replace(DOS_END, "")
@@ -103,7 +103,7 @@ def _decoded(head: bytes) -> tuple[str, tuple[str, ...]] | None:
 
 
 def _may_stand_in_text(character: str) -> bool:
-    """Tell whether a character may stand in a text."""
+    """Tell whether a character may occur in a text file."""
     return character.isprintable() or character in "\t\r\n\f"
 
 
@@ -139,14 +139,14 @@ def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) ->
     """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
-    if words:  # none of which is a number with the other sign: 1.234 may be a thousand of something
+    if words:  # no cell may be a number with the other decimal sign: 1.234 may be 1234
         other = "." if decimal == "," else ","
         return numbers >= 2 and len(rest) <= numbers and not any(is_number(cell, other) for cell in rest)
     return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
 
 
 def layout(path: Path) -> TextLayout:
-    """Find the layout of a text with one table of numbers.
+    """Find the layout of a text file with one table of numbers.
 
     Words are accepted in its rows only if nearly all rows have some. Raises LogError if there is no table.
     """
@@ -191,13 +191,14 @@ def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
 
 
 _Fit = tuple[tuple[int, bool, int], TextLayout] | None
-"""A layout with the quality of its fit: rows of numbers, whether the heading is as long, columns. None for no fit."""
+"""A layout, preceded by the quality of its fit: rows of numbers, whether the heading is as long as they, columns. None
+if it does not fit."""
 
 
 def _fits(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
 ) -> tuple[_Fit, _Fit]:
-    """Return how well a delimiter and a decimal sign fit, without words in rows and with them.
+    """Rate how well a delimiter and a decimal sign fit, without and with words in rows.
 
     `rows` is the result of splitting by the delimiter.
     """
@@ -213,7 +214,7 @@ def _fits(
 def _fit(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
 ) -> _Fit:
-    """Return the quality of a delimiter and a decimal sign, given which rows are numbers."""
+    """Rate a delimiter and a decimal sign, given which rows are numbers."""
     if not any(is_row):
         return None
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
@@ -225,7 +226,7 @@ def _fit(
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
-    """Tell whether a row of numbers is followed by one of equal length, as in a table."""
+    """Tell whether a row of numbers is followed by a row of equal length, as in a table."""
     following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
     if following is None or not any(is_row[i + 1 :]):
         return True
@@ -243,7 +244,7 @@ def _headings(
     if not heads:
         return (), ()
     last = heads[-1]
-    bare = ["" if is_number(cell, ".") else cell.strip("[]()") for cell in last]  # single values stand beside a scope's
+    bare = ["" if is_number(cell, ".") else cell.strip("[]()") for cell in last]  # single values beside a table
     cells = [cell for cell in bare if cell and cell != "-"]
     if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
         return tuple(heads[0]), tuple(bare)
@@ -265,7 +266,7 @@ def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
     """
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:
-        closed = line[: max(map(line.rfind, ")]")) + 1]  # no bracket is looked for an end that is not there
+        closed = line[: max(map(line.rfind, ")]")) + 1]  # stop at an opening bracket without an end
         named = re.findall(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\])]*[\])]", closed)
         return [name.strip() for name in named] if len(named) == columns else cells
     return cells

@@ -25,7 +25,7 @@ from friso.quantities import quoted
 def read_text(path: Path) -> ChannelTable:
     """Read the table of a text file.
 
-    Raises LogError for ragged rows and for a text among the numbers, with its line.
+    Raises LogError, with the line, for ragged rows and for a text among the numbers.
     """
     form = layout(path)
     if not form.certain and form.delimiter != "," and _has_comma(path, form):
@@ -71,7 +71,7 @@ def _such_as(cells: Any) -> str:
 def read_frame(path: Path, form: TextLayout) -> Any:
     """Read all cells from the first row of numbers on; columns without text are floats.
 
-    The lines before are skipped here, because pandas would take a single quotation mark in them for an open one. Raises
+    Lines before the table are skipped here, because pandas would take a lone quotation mark in them as opening. Raises
     LogError.
     """
     options: dict[str, Any] = {
@@ -86,11 +86,11 @@ def read_frame(path: Path, form: TextLayout) -> Any:
             for _ in range(form.first):
                 file.readline()
             with warnings.catch_warnings():
-                warnings.simplefilter("error", pd.errors.ParserWarning)  # that cells are dropped
+                warnings.simplefilter("error", pd.errors.ParserWarning)  # pandas warns that cells are dropped
                 frame = pd.read_csv(_WithoutDosEnd(file), **options, on_bad_lines="error")  # pyright: ignore
     except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
         raise ragged(path, form, str(error)) from None
-    if frame.iloc[:, -1].notna().any():  # one more than there are columns: a row may end with a delimiter
+    if frame.iloc[:, -1].notna().any():  # one cell more than columns: a row may end with a delimiter
         raise ragged(path, form)
     return frame.iloc[:, :-1]
 
@@ -114,7 +114,7 @@ class _WithoutDosEnd:
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
     """Return the error for a line with too many cells, or an unclosed quotation mark.
 
-    For other errors it has the parser's own words.
+    Other errors of the parser are quoted in its own words.
     """
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -146,7 +146,7 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Tell whether a comma occurs anywhere after the first numbers of a file whose head has whole numbers only."""
+    """Tell whether a comma occurs anywhere after the first numbers of a file."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
         for _ in range(form.first):
@@ -204,7 +204,7 @@ def as_numbers(texts: Any) -> np.ndarray:
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
     """Return the seconds since the first of some time stamps.
 
-    Of dates not in ISO 8601, in which day or month may come first, only the time of day counts; one that steps back
+    In dates that are not ISO 8601, day or month may come first: only the time of day counts, and a time that steps back
     belongs to the next day.
     """
     texts = texts.str.replace(",", ".", regex=False)
@@ -216,7 +216,7 @@ def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarr
             seconds = _time_of_day(texts.where(present))
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
     except ValueError as error:
-        why = re.split(r"\.? You might|\n", str(error))[0]  # then follows what a programmer may do
+        why = re.split(r"\.? You might|\n", str(error))[0]  # the other texts may come from home-made programs
         raise LogError("log", why, "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)) from None
     return seconds - seconds[int(np.flatnonzero(present)[0])]
 
@@ -225,7 +225,7 @@ def _time_of_day(texts: Any) -> np.ndarray:
     """Return seconds since midnight from texts that end with a time of day; NaN for others."""
     parts = texts.str.extract(rf"{CLOCK}$")
     hours, minutes, seconds = (as_numbers(parts[i].fillna("0").where(parts[0].notna())) for i in range(3))
-    behind_colon = texts.str.count(":") == 3  # they may go without their zeros: 9:05:00:7 is 7 ms before 9:05:00:14
+    behind_colon = texts.str.count(":") == 3  # fractions may lack leading zeros: 9:05:00:7 is 7 ms before 9:05:00:14
     digits = parts[3].where(~behind_colon, parts[3].str.zfill(int(parts[3].str.len().fillna(0).max())))
     fractions = as_numbers("0." + digits.fillna("0"))
     halves = parts[4].str.lower().to_numpy()
@@ -255,8 +255,8 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
 def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
     """Give each column the instants of the nearest time column to its left with equal length.
 
-    Without one to the left, the only time column of the file is used, which may be longer than the column. A time
-    column has a name and a unit of time.
+    If there is none to the left, the file's only time column is used, which may be longer. A time column has a name of
+    time and a unit of time.
     """
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name, c.unit) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]

@@ -35,9 +35,8 @@ class Track:
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     """Clean a channel, and put it on even instants.
 
-    Values that are no numbers and repeated stamps [s] are left out, a few lost samples interpolated, and longer gaps
-    split it. Raises LogError for too few samples, decreasing time, stamps repeated with other values, and uneven
-    sampling.
+    NaN and repeated stamps [s] are left out, a few lost samples are interpolated, and longer gaps split the track.
+    Raises LogError for too few samples, decreasing time, stamps repeated with other values, and uneven sampling.
     """
     settings = LogSettings.current()
     read: list[str] = []
@@ -59,7 +58,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
         max(settings.scatter_of_even_stamps, settings.deviations_of_a_gap * float(np.std(steps[~long])) / period),
         settings.error_of_a_whole_gap,
     )
-    whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
+    whole = np.abs(steps / period - 1 - lost) <= scatter  # otherwise the clock was reset
     bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
     edges = [0, *(np.flatnonzero(long & ~bridged) + 1).tolist(), time.size]
     inserted = np.where(bridged, lost, 0).astype(int)
@@ -70,14 +69,14 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 
 def usual_step(steps: np.ndarray) -> float:
-    """Return the mean [s] of the time steps, shape (n,), that are no gaps."""
+    """Return the mean of the time steps [s], shape (n,), without gaps."""
     return float(steps[~gaps(steps)].mean())
 
 
 def gaps(steps: np.ndarray) -> np.ndarray:
     """Tell which time steps, shape (n,), are gaps.
 
-    Samples after a gap stay late, while a step that only scatter made long has short neighbours.
+    After a gap, samples stay late; a step that is long by scatter only has short neighbours.
     """
     settings = LogSettings.current()
     usual = float(np.median(steps))
@@ -94,8 +93,8 @@ def gaps(steps: np.ndarray) -> np.ndarray:
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Interpolate lost samples by a cubic spline through the others.
 
-    `lost` counts them after each sample but the last, shape (n - 1,). Returns instants and values, and which samples
-    were lost.
+    `lost`, shape (n - 1,), counts the samples lost after each sample but the last. Returns all instants and values, and
+    marks of lost samples.
     """
     if not lost.any():
         return time, values, np.zeros(time.size, bool)
@@ -108,7 +107,7 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Return the samples that are numbers, and how many inside are not.
+    """Return the samples that are numbers, and how many samples between them are not.
 
     Raises LogError.
     """
@@ -190,8 +189,8 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
     """Bring all tracks to the instants of the coarsest one that all of them cover.
 
-    Returns these instants as a track, and the values by name. Others are interpolated linearly within their own
-    segments. Raises LogError if the tracks have no time in common.
+    Returns the common instants as a track, and the values by name. Finer tracks are interpolated linearly within their
+    own segments. Raises LogError if the tracks have no time in common.
     """
     settings = LogSettings.current()
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))

@@ -16,7 +16,7 @@ from friso.quantities import Quantity, any_sign, quoted
 
 _WORDS = read_lists("units")
 RMS, COUNTS = (frozenset(_WORDS[name]) for name in ("rms", "counts"))
-"""Spellings of RMS amperes of a drive's phases, and of sensor counts."""
+"""Spellings of RMS amperes (of a drive's phases), and of sensor counts."""
 
 OTHERS = {
     "m": ("rad",),
@@ -28,9 +28,9 @@ OTHERS = {
     "rad/s^2": ("m/s^2",),
     "N*m": ("A", "V", "N"),
 }
-"""Units that may replace the SI unit of a role, on a linear or rotary axis, if the caller allows it."""
+"""Units that may replace the SI unit of a role, on a linear or rotary axis, if the caller allows them."""
 FOREIGN = (*OTHERS["N"], "count")
-"""Units of a force for which estimates per unit are an answer."""
+"""Units in place of a force for which estimates per unit are useful."""
 RESPONSES = tuple(
     f"{place}{rate}/{force}"
     for place, torque in (("m", "N"), ("rad", "(N*m)"))
@@ -60,7 +60,7 @@ _MEASURED_IN = channel_words()["measured_in"]
 def likely_unit(words: Iterable[str]) -> str:
     """Return the unit that the words of a name imply; "" for none.
 
-    A single letter is no word.
+    Single letters imply no unit.
     """
     long_words = {word for word in words if len(word) > 1}
     return next((unit for unit, names in _MEASURED_IN.items() if names & long_words), "")
@@ -72,7 +72,7 @@ def without_accents(name: str) -> str:
 
 
 def spelled(text: str) -> str:
-    """Return a unit text as `friso.quantities` takes it; "" for none.
+    """Convert a unit text to the spelling of `friso.quantities`; "" for none.
 
     "m/s2" becomes "m/s^2", "µm" "um", "sec" "s". A text too long for a unit stays.
     """
@@ -89,7 +89,7 @@ def spelled(text: str) -> str:
 def _below(part: str, before: str) -> str:
     """Return the unit text after a division sign, in brackets if it is a product.
 
-    Otherwise "rad/N*m" would read as rad/N times m.
+    Without brackets "rad/N*m" would read as rad/N times m.
     """
     return f"({part})" if before == "/" and "*" in part else part
 
@@ -114,7 +114,7 @@ def is_unit(text: str) -> bool:
 def of_decibels(text: str) -> str | None:
     """Return the reference of decibels, "" if not stated; None if the unit is not decibels.
 
-    Of "dB re 1 m/N" it is "1 m/N".
+    For "dB re 1 m/N" the result is "1 m/N".
     """
     match = _DECIBELS.fullmatch(text)
     return None if match is None else match[1].strip()
@@ -150,7 +150,7 @@ def split_heading(heading: str) -> tuple[str, str]:
     if quotient is not None and is_unit(unit := f"{quotient['over']}/{quotient['under']}"):
         return quotient["name"], unit
     if quotient is not None and quotient["over"] != "s" and ("*" in quotient["over"] or is_unit(quotient["over"])):
-        return heading, ""  # but of "Weg s/mm"
+        return heading, ""  # except for "Weg s/mm"
     over = _OVER.fullmatch(heading)
     if over is not None and is_unit(over["unit"].strip("()")) and not is_unit(heading):
         return over["name"], over["unit"].strip("()")
@@ -177,10 +177,10 @@ def _last_part(name: str) -> str:
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:
-    """Return a factor, and the unit of the values multiplied by it.
+    """Return the factor that converts a unit as far as possible, and the resulting unit.
 
-    It is the unit of the role if possible, else one that may replace it, else the given unit with factor 1 ("1" for no
-    unit).
+    The result is the unit of the role if possible, else a unit that may replace it, else the given unit with factor 1
+    ("1" for no unit).
     """
     for target in (role_unit, *OTHERS.get(role_unit, ())):
         value = unit_factor(unit, target) if unit else None
@@ -220,7 +220,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
 
 
 def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
-    """Return the SI value above the stroke.
+    """Return the SI value of a scale's part above the stroke.
 
     Raises LogError.
     """

@@ -16,7 +16,7 @@ def read_lists(name: str) -> dict[str, Any]:
 
 @cache
 def channel_words() -> dict[str, Any]:
-    """Return the words in names of channels, each table of languages as one set of words."""
+    """Return the words in names of channels; the lists of all languages are joined to sets."""
     return _joined(read_lists("names"))
 
 

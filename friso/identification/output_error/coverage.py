@@ -13,7 +13,7 @@ from friso.identification.readings.common import turns_of
 
 @dataclass(frozen=True)
 class Coverage:
-    """Coverage of a record's motion: steady speeds, and starts of motions.
+    """Steady speeds and starts of motion that a record contains, by which parameters can show.
 
     `steady` has speeds of steady motion [m/s], ascending, one per stretch. `starts` has, for each stretch between
     turning points, the distances [m] covered at its samples, NaN where inertia outweighed friction. `resolution` [m] is
@@ -28,7 +28,7 @@ class Coverage:
     def shows_speed(self, speed: float) -> bool:
         """Tell whether there is steady motion near a speed [m/s], both below and above it.
 
-        The Stribeck velocity shows in the fall of friction about it, which steady motion on one side does not show.
+        Friction falls around the Stribeck velocity; steady motion on one side of it alone does not show the fall.
         """
         settings = OutputErrorSettings.current()
         below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
@@ -57,10 +57,11 @@ class Coverage:
 
 
 def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
-    """Determine the coverage of a motion: steady speeds, and starts.
+    """Determine at which steady speeds, and from which starts, a record moves.
 
-    The motion, of shape (n,), is that of a mass [kg] with a Coulomb friction [N], sampled every `sample_time` [s]. It
-    is steady where inertia stays below a fraction of that friction for long enough.
+    `position` [m] has the shape (n,) and is sampled every `sample_time` [s]; `moved` is the filtered motion. Motion
+    counts as steady where inertia, by `mass` [kg], stays below a fraction of the friction `coulomb` [N] for long
+    enough.
     """
     settings = OutputErrorSettings.current()
     rough = position - moved.position
@@ -85,10 +86,10 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
 
 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
-    """Return the distances [m] covered from each turning point to the next, where inertia was small.
+    """Return the distances [m] covered from each turning point to the next.
 
-    A swing below `swing` [m] is no turn. Samples at which inertia outweighs friction are NaN, because the force does
-    not show the bristles there.
+    A reversal by less than `swing` [m] is no turn. Samples at which inertia outweighs friction are NaN, because the
+    force does not show the bristles there.
     """
     ends = np.unique([0, *turns_of(position, swing)])
     calm = mass_per_force * np.abs(moved.acceleration) < OutputErrorSettings.current().friction_share_of_inertia
@@ -97,5 +98,5 @@ def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, 
 
 
 def _speeds(speed: np.ndarray, length: int) -> np.ndarray:
-    """Return the mean speeds [m/s] of the pieces of a stretch, each of about `length` samples."""
+    """Cut a stretch into pieces of about `length` samples, and return their mean speeds [m/s]."""
     return np.array([piece.mean() for piece in np.array_split(speed, max(1, len(speed) // length))])

@@ -15,11 +15,11 @@ from friso.intervals import COVERAGE
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
-    """Draw machines from the ranges that a record leaves open, as fitted numbers, (draws, parameters).
+    """Draw machines from the ranges that a record leaves open, as rows of fitted numbers.
 
-    They are drawn about the numbers of the fit, `inner`. Determined quantities are drawn by their intervals and
-    `correlation`. Others are uniform in the remaining range, or in its logarithm; a parameter without a range is drawn
-    from all of its own.
+    The result has the shape (draws, parameters). `inner`, shape (parameters,), has the numbers of the fit. Determined
+    quantities are drawn by their intervals and `correlation`. Quantities with a range only are uniform in it, or in its
+    logarithm; a parameter without an estimate is drawn from its whole range of the fit.
     """
     settings = OutputErrorSettings.current()
     rng = np.random.default_rng(settings.seed_of_draws)
@@ -53,7 +53,7 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Return a parameter of drawn machines from their keys; None if the keys do not determine it."""
+    """Compute a fit parameter of drawn machines from stage-file keys; None if keys are missing."""
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

@@ -18,8 +18,9 @@ from friso.intervals import COVERAGE
 class ExplainedResidual:
     """Effect of forces that the model leaves out on the residual of a fit.
 
-    `moved` is the shift of the fitted numbers, shape (free,), `sizes` are the sizes of the effects, and `left` is the
-    remaining fraction of the residual's power, `rest` [N], shape (n,), with the derivatives `slopes` to all of these.
+    `moved` is the shift of the fitted numbers, shape (free,); `sizes` are the fitted sizes of the effects; `left` is
+    the fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining residual, and `slopes`
+    its derivatives to numbers and sizes.
     """
 
     moved: np.ndarray
@@ -29,9 +30,10 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last size differs from 0 by more than errors that return.
+        """Tell whether the last size differs from 0 by more than its correlated errors.
 
-        At the reversals of a slow sine, a coupling or a delay is the same as a friction that differs a little.
+        Errors repeat at every reversal: for a slow sine, a coupling or a delay then looks like slightly different
+        friction.
         """
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)
@@ -43,10 +45,10 @@ class ExplainedResidual:
 def explained_by_forces(
     fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit further forces to the residual of a fit, with its own numbers free to follow.
+    """Fit additional forces to the residual of a fit, and let the fitted numbers change along.
 
-    Each force [N], shape (n,), has size 1; it is tried at the size `unit`, small enough to be linear. Returns None if
-    the forces explain no more than the best of `searched` random ones.
+    Each force [N], shape (n,), has size 1; it is simulated at its size in `units`, small enough to be linear. Returns
+    None if the forces explain no more than the best of `searched` random ones.
     """
     rest, slopes = fit.linearised
     return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
@@ -55,7 +57,7 @@ def explained_by_forces(
 def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray, searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit a residual, shape (n,), by fitted numbers and further effects.
+    """Fit a residual, shape (n,), by changes of the fitted numbers and by additional effects.
 
     Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number without effect, or
     with infinite derivatives, does not move. Returns None if the effects clearly explain nothing.
@@ -79,17 +81,19 @@ def explained_by(
 
 
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
-    """Tell whether the last size of further forces is sure if all numbers may follow."""
+    """Tell whether the last additional force is sure if all model parameters may change."""
     rest, slopes = beside_all_numbers(fit)
     explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
     return explained is not None and explained.is_sure(fit)
 
 
 def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a fit leaves beside all numbers of its model, and the derivatives to these, (n, parameters).
+    """Return the residual after a linear refit of all parameters, with its derivatives.
 
-    Numbers that the log does not show were not fitted, and what they would explain, as the Stribeck effect at a
-    reversal, is no effect outside the model.
+    The residual [N] has the shape (n,), the derivatives (n, parameters).
+
+    Parameters that the log does not determine take part: what they explain, such as the Stribeck effect at a reversal,
+    is no effect outside the model.
     """
     rest, slopes = fit.problem.linearised(fit.inner, np.ones(len(fit.inner), bool))
     size = np.linalg.norm(slopes, axis=0)
@@ -100,14 +104,14 @@ def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
-    """Return the fit with intervals that reach `further`, shape (free,), each way."""
+    """Return the fit with its intervals widened by `further`, shape (free,), each way."""
     return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 
 def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
-    """Return the change of a fit's residual by further forces, per size, each of shape (n,).
+    """Return the change of a fit's residual per unit of each additional force, shape (n,) each.
 
-    Each force [N], shape (n,), has size 1, and is tried at the size `unit`. All are simulated side by side.
+    Each force [N], shape (n,), has size 1 and is simulated at its size in `units`. All are simulated side by side.
     """
     inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
     pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))

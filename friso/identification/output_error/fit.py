@@ -1,4 +1,5 @@
-"""Fit the whole model: simulate a thousand starts, refine the best side by side, and finish the best of those."""
+"""Fit the whole model: simulate a thousand starts, refine the best few side by side, and iterate the best to the
+end."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ class OutputErrorFit:
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Tell whether the residual is about the `noise` [N] of the log; the limit is tighter if `closely`.
+        """Tell whether the residual is about the log's `noise` [N]; the limit is tighter if `closely`.
 
         For a stage that follows the log, only a part of the noise passes into the residual.
         """
@@ -60,7 +61,7 @@ class OutputErrorFit:
 
     @property
     def bounded(self) -> set[int]:
-        """The fitted numbers that are known well enough to be told: their intervals do not span all that may be."""
+        """Return the free numbers whose intervals are narrow enough to be reported."""
         settings, bounded = OutputErrorSettings.current(), set()
         for number, deviation in zip(self.free, self.deviation, strict=True):
             parameter = self.problem.parameters[number]
@@ -69,7 +70,10 @@ class OutputErrorFit:
         return bounded
 
     def is_noise_of_motion(self, noise: float) -> bool:
-        """Tell whether noise of the motion, which adds up and passes for slow effects, explains all that is left."""
+        """Tell whether noise of the logged motion explains the whole residual.
+
+        Such noise accumulates and resembles slow effects. `noise` [N] is the force noise of the log.
+        """
         return self.problem.shaking[0] > 0 and self.left <= self.problem.noise_left(noise)
 
     @property
@@ -97,13 +101,13 @@ class OutputErrorFit:
         usable = np.isfinite(self.deviation) & (self.deviation > 0)
         wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
         fit = replace(self, covariance=self.covariance * np.outer(wider, wider))
-        if "linearised" in vars(self):  # derivatives do not depend on how well the numbers are known
+        if "linearised" in vars(self):  # the derivatives do not depend on the covariance
             vars(fit)["linearised"] = self.linearised
         return fit
 
     @cached_property
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
+        """Residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
 
@@ -114,7 +118,7 @@ class OutputErrorFit:
 
 
 def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
-    """Return the fitted numbers at which the parameters start, shape (parameters,)."""
+    """Return the start values of the parameters as fitted numbers, shape (parameters,)."""
     return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
@@ -145,7 +149,7 @@ def fits(
 def _fit(
     problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
 ) -> OutputErrorFit:
-    """Refine the best starts in rounds that keep fewer and fewer, and finish the last one.
+    """Refine the best starts in rounds that keep fewer and fewer, and finish the last start.
 
     The quality of a start shows after a few iterations, on pieces of a long record: for a stage that sticks and slips
     the best starts often lead to worse optima.
@@ -167,10 +171,11 @@ def _fit(
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Spread many starts over the ranges of the free parameters, (starts, parameters), beginning with `first`.
+    """Spread many starts over the ranges of the free parameters, beginning with `first`.
 
-    They find parameters that not every motion shows. Core parameters start near the inverse model's values, because a
-    first fit of them alone to stick-slip motion can end anywhere.
+    The result has the shape (starts, parameters). Wide starts are needed for parameters that only some motions show.
+    Core parameters start near the inverse model's values, because a first fit of them alone to stick-slip motion can
+    end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
@@ -190,9 +195,10 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts from another problem's fit, (starts, parameters), beginning with that fit.
+    """Draw starts around the fit of another problem; the first start is the fit itself.
 
-    They are drawn from its covariance, several times as wide, because the loop of a stage that hunts has other optima.
+    The result has the shape (starts, parameters). Starts spread several times as wide as the fit's covariance, because
+    the closed loop of a hunting stage has other optima.
     """
     settings = OutputErrorSettings.current()
     low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
@@ -214,7 +220,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Return the best starts of each problem, (tried, parameters), always with the first one."""
+    """Return the best starts of each problem, (tried, parameters), including the first start."""
     settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
@@ -248,7 +254,7 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """Finish a fit, and determine the uncertainty of its numbers.
 
-    Deviations allow for correlated errors, and for other inputs that the log allows (`unsettled`).
+    Standard deviations allow for correlated errors, and for the other inputs that the log allows (`problem.unsettled`).
     """
     settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
@@ -264,8 +270,8 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progres
 def spread_along(problem: Problem, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Return the covariance of numbers fitted to a problem, shape (p, p).
 
-    The residual `rest` [N] has the shape (n,), its derivatives `slopes` (n, p). Errors return with time, place and
-    speed: the many reversals of one sine say no more than a few.
+    The residual `rest` [N] has the shape (n,), its derivatives `slopes` (n, p). Errors are taken to be correlated in
+    time, place and speed: many reversals of one sine tell no more than a few.
     """
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
@@ -274,10 +280,10 @@ def spread_along(problem: Problem, slopes: np.ndarray, rest: np.ndarray) -> np.n
 
 
 def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
-    """Widen a covariance, (free, free), so that intervals contain the results of other inputs.
+    """Widen a covariance, (free, free), until intervals contain the results with other inputs.
 
-    Each of `moved`, shape (free,), is the shift of the fitted numbers by one input. One of the inputs is true, not
-    their mean, so half of the distance would not do.
+    Each of `moved`, shape (free,), is the shift of the fitted numbers by one input. Intervals reach the whole shift,
+    because one of the inputs is true, not their mean.
     """
     if not moved:
         return covariance

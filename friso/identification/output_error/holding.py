@@ -13,9 +13,8 @@ from friso.identification.output_error.settings import OutputErrorSettings
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
     """Smooth the position of a log less and less, as long as the fit improves.
 
-    Smoothing blurs the instants of break-away: for stick-slip motion, the exponent of the Stribeck curve came out at
-    1.47 for 2 and the bristles a fifth too soft, even without noise. Too little smoothing passes the noise of the
-    position on to the force.
+    Smoothing blurs the instants of break-away: for stick-slip motion without noise, a Stribeck exponent of 2 was fitted
+    as 1.47 and the bristles a fifth too soft. Too little smoothing passes the noise of the position on to the force.
     """
     while fit.problem.sharper:
         sharper = polished(fit.problem.held_to(0), fit.free, fit.inner)
@@ -28,8 +27,9 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     """Choose whether the force of a log is held between its samples or interpolated linearly.
 
-    They differ by half a sample, which shifts the damping of the bristles by half a sample times their stiffness. The
-    worse one is dropped if the better explains the record to the `noise` [N] of its force, and the worse clearly less.
+    The choices differ by half a sample, which shifts bristle damping by half a sample times the bristle stiffness. The
+    worse choice is dropped if the better explains the record to the `noise` [N] of its force, and the worse clearly
+    less.
     """
     settings = OutputErrorSettings.current()
     problem = fit.problem

@@ -1,4 +1,7 @@
-"""Decide which parameters a log determines: fit those that any motion shows, then all, and profile the others."""
+"""Decide which parameters a log determines.
+
+Parameters that any motion shows are fitted first, then all; parameters that need special motion are profiled.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +22,17 @@ from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
 
 PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
-"""Fractions of the work up to the ends of its parts: mass and sliding friction, all parameters in closed loop, all
-along the log, and the closed loop from there; the last part is the uncertainty."""
+"""Progress of the whole fit at the ends of its steps: mass and sliding friction; all parameters in closed loop; all
+parameters along the log; the closed loop started from the fit along the log. Uncertainties are the last step."""
 
 FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
-"""Fractions of the work of the fit along the log up to the ends of its parts: the fit of all parameters, the motion
-between samples, and profiles; the last part fits the determined ones."""
+"""Progress of the fit along the log at the ends of its steps: all parameters; the motion between samples; profiles. The
+last step refits the determined parameters."""
 
 
 @dataclass(frozen=True)
 class IdentifiableFit:
-    """A fit, with the parameters that the record determines.
+    """A fit, and the names of the parameters that the record determines.
 
     `profiles` has, by name, the profiles of parameters that not every motion shows, and `shown` the names of the
     determined ones. `refuted` are parameters that something else in the record contradicts, with the reason.
@@ -51,12 +54,13 @@ def fit_identifiable(
 ) -> IdentifiableFit:
     """Fit the whole model to a log, and decide which parameters to report.
 
-    `bandwidth` [Hz] is that of the motion, and `noise` [N] that of the force.
+    `follows` is the stage driven along the log, `loop` the stage with its own controller (None: not available).
+    `bandwidth` [Hz] is the motion's, `noise` [N] the force's.
 
-    A closed loop that explains the record to its noise decides, started if necessary from the fit of the stage that
-    follows the log. Without one, the stage that follows the log decides which parameters are determined, because a loop
-    that hunts soon gets out of step; the loop then only improves values, unless it cannot follow. If the fit is clearly
-    better with undetermined parameters it keeps them, because friction and mass would otherwise absorb their effect.
+    If the closed loop explains the record to its noise, its fit decides; it may start from the fit of the stage that
+    follows the log. Otherwise the stage that follows the log decides which parameters are determined, because a hunting
+    loop soon gets out of step; the loop then only improves values, if it can follow. If the fit is clearly better with
+    undetermined parameters it keeps them, because friction and mass would otherwise absorb their effect.
     """
     names = follows.names
     core = {parameter.name for parameter in follows.parameters if parameter.core}
@@ -123,8 +127,8 @@ def believed(
 ) -> IdentifiableFit:
     """Profile parameters that not every motion shows, and decide which of them to report.
 
-    If the fit has `explained` the record, a sharp profile suffices; otherwise the motion must also cover the effect of
-    the parameter, and others have no profile. If a profile finds a clearly better fit, that one replaces it.
+    If the fit has `explained` the record, a sharp profile suffices. Otherwise the motion must also cover the
+    parameter's effect, and only such parameters are profiled. A clearly better fit found in a profile replaces `full`.
     """
     names = full.problem.names
     profiles: dict[str, Profile] = {}
@@ -158,8 +162,8 @@ def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
     """Tell whether a closed loop follows the log about as well as the stage driven along the log.
 
-    Their residuals are compared within the motion's bandwidth [Hz], and only where the latter counts, because it
-    contains no noise above that.
+    The residuals are compared below the motion's bandwidth [Hz], above which only the loop's residual has noise, and at
+    the samples that count for the driven stage.
     """
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
@@ -169,7 +173,7 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
     """Tell whether a closed loop bounds all numbers that the stage following the log bounds.
 
-    For stick-slip motion, the derivatives of a loop may contain nothing but slightly shifted break-aways.
+    For stick-slip motion the derivatives of a closed loop may show only shifted break-aways, and bound nothing.
     """
     bounded = [
         {i for i, variance in zip(fit.free, np.diag(fit.covariance), strict=True) if np.isfinite(variance)}
@@ -179,18 +183,18 @@ def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
-    """Return the places of the chosen names."""
+    """Return the indices of the chosen names."""
     return tuple(i for i, name in enumerate(names) if name in chosen)
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve if only one of its parameters is determined, which alone means nothing."""
+    """Drop the Stribeck curve if only one of its parameters is determined."""
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
-    """Tell whether the motion covers anything in which a parameter could show itself."""
+    """Tell whether the record contains motion in which a parameter could have a visible effect."""
     parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
     if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
@@ -200,7 +204,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
 
 
 def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
-    """Tell whether a profile closes on both sides, near the fit."""
+    """Tell whether a profile interval is closed on both sides and narrow."""
     settings = OutputErrorSettings.current()
     parameter = next(one for one in full.problem.parameters if one.name == seen.name)
     closed = not (seen.open_low or seen.open_high)
@@ -208,7 +212,7 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
-    """Tell whether the motion covers the speeds, or the displacements, at which a fitted parameter acts."""
+    """Tell whether the motion covers the speeds or displacements at which a parameter acts."""
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:

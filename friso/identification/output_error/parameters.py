@@ -14,22 +14,22 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
-"""Names of parameters: the moving mass; the cart's fraction of it, which a rigid stage keeps as given; static over
-Coulomb friction."""
+"""Names of fit parameters: moving mass; the cart's fraction of it (a rigid stage keeps the stage file's); ratio of
+static to Coulomb friction."""
 
 EXPONENT = "friction.stribeck_exponent"
 STRIBECK = (RATIO, "friction.stribeck_velocity")
 CURVE = (*STRIBECK, EXPONENT)
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
-"""Parameters of the Stribeck curve, and those of the bristles."""
+"""Fit parameters of the bristles; `CURVE` has the parameters of the Stribeck curve."""
 
 
 @dataclass(frozen=True)
 class FitParameter:
     """A parameter of the fit with its SI unit, start value and range.
 
-    Of a `logarithmic` one the logarithm is fitted. `core` parameters are shown by any motion; others are examined one
-    by one.
+    The logarithm of a `logarithmic` parameter is fitted. Any motion shows a `core` parameter; all others are examined
+    one by one.
     """
 
     name: str
@@ -50,7 +50,7 @@ class FitParameter:
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return bounds of the pre-sliding displacement for the fit [m], or [rad] on a rotary axis.
+    """Return the range of pre-sliding displacements in a fit [m], or [rad] on a rotary axis.
 
     Angles follow from the smallest and largest bearing radii.
     """
@@ -75,7 +75,7 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage given as flat keys has a joint that moves."""
+    """Tell whether a stage, given by flat keys, has a joint that moves freely."""
     return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
@@ -85,9 +85,9 @@ def fit_parameters(
     """List the parameters of a stage that a log may determine, with their starts and ranges.
 
     `levels` has first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s] is
-    the highest in the log, and `travel` [m] its range: no bristle bends further, and no Stribeck velocity is higher
-    unless bearings have such. If the log does not go `both_ways`, a constant force and an asymmetry cannot be
-    distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
+    the highest in the log, and `travel` [m] its range: bristles bend no further, and the Stribeck velocity is no higher
+    unless bearings typically have higher ones. If the log does not go `both_ways`, a constant force and an asymmetry
+    cannot be distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
     """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
@@ -115,7 +115,7 @@ def fit_parameters(
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """List the parameters of friction."""
+    """List the fit parameters of the friction law; arguments are those of `fit_parameters`."""
     settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
@@ -141,9 +141,9 @@ def _friction(
 
 
 def _exponent(stated: float) -> FitParameter:
-    """Return the exponent of the Stribeck curve as a parameter.
+    """Define the fit parameter for the exponent of the Stribeck curve.
 
-    It starts slightly below the stage's value, because 1 and 2 have equations without an exponent.
+    The fit starts slightly below the `stated` value, because 1 and 2 have simplified equations.
     """
     settings = OutputErrorSettings.current()
     start, (least, most) = settings.exponent_share_of_a_start * stated, settings.stribeck_exponents
@@ -151,16 +151,16 @@ def _exponent(stated: float) -> FitParameter:
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:
-    """Return a parameter that only slow motion shows, starting at the stage's value.
+    """Define a parameter that only slow motion shows; its fit starts at the stage's value.
 
-    Its range is widened to contain that value.
+    The range from `low` to `high` is widened to contain the start.
     """
     start = float(flat[name])
     return FitParameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """Return the flat keys of the stages for fitted numbers, shape (runs, parameters)."""
+    """Turn fitted numbers, shape (runs, parameters), into stages as flat keys."""
     values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 

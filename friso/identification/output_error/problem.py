@@ -33,7 +33,7 @@ PASSES = 5 / 8
 
 @dataclass(frozen=True)
 class Simulated:
-    """Simulated records: position, velocity and force of the controller, in SI units.
+    """Simulated records of position, velocity and the controller's force, in SI units.
 
     Each has the shape (runs, n), or (n,) of one run, and is NaN after a failure.
     """
@@ -47,14 +47,15 @@ class Simulated:
 class Problem:
     """A stage that follows a log, with the parameters to fit and the force [N] to reproduce.
 
-    In a `closed` loop the stage has its machine's controller and follows the logged reference; `target` is the logged
-    force. Otherwise the logged force acts on the stage, and a controller of friso's own drives it along the logged
-    position; `target` is zero, because the force of that controller is what the model does not explain.
+    In a `closed` loop the stage has its own controller and follows the logged reference; `target` is the logged force.
+    Otherwise the logged force acts on the stage, and a guiding controller of friso drives it along the logged position;
+    `target` is zero, because the guiding controller's force is what the model does not explain.
 
     `start` has position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
-    leaves out. `unsettled` are other inputs that the log allows, and `sharper` are positions [m], smoothed less and
-    less, that the stage may follow instead. `shaking` [N] is the force with which the guiding controller follows the
-    noise of the position, for the position taken and each sharper one; 0 where it is small beside the force's noise.
+    leaves out. `unsettled` has alternative inputs that the log allows (held or interpolated force, smoothness).
+    `sharper` has positions [m], smoothed less and less, that the stage may follow instead. `shaking` [N] is the guiding
+    controller's force due to position noise, for the position followed and each sharper one; 0 if small beside the
+    force's noise.
     """
 
     flat: Mapping[str, Any]
@@ -81,10 +82,10 @@ class Problem:
         return kernel(self.form)
 
     def noise_left(self, noise: float) -> float:
-        """Return the RMS [N] of the residual that noise leaves, if the log's force has this `noise` [N].
+        """Return the RMS residual [N] that noise alone leaves, if the force has this `noise` [N].
 
-        In closed loop it is the noise; for a stage that follows the log it is the part that the guiding controller
-        passes, (2 w s + w^2) / (s + w)^2, and the force with which it follows the noise of the position.
+        In closed loop the residual is the noise itself. For a stage that follows the log it is the noise passed by the
+        guiding controller, (2 w s + w^2) / (s + w)^2, plus the controller's response to position noise.
         """
         if self.closed:
             return noise
@@ -95,7 +96,7 @@ class Problem:
     def held_to(self, level: int) -> Problem:
         """Return the problem with the stage driven along one of the `sharper` positions, by number.
 
-        The next sharper one then counts among the unsettled inputs.
+        The next sharper position is added to the unsettled inputs.
         """
         inputs = replace(self.inputs, reference=self.sharper[level])
         held = tuple(replace(inputs, held=one.held) for one in self.unsettled if one.held != self.inputs.held)
@@ -108,7 +109,7 @@ class Problem:
     def part(self, samples: slice) -> Problem:
         """Return the problem on a stretch of the samples.
 
-        A stretch that does not begin with the first sample begins on the reference, as a stage that follows a log does.
+        A stretch that begins later than the first sample starts on the reference.
         """
         reference = self.inputs.reference[samples]
         inputs = replace(self.inputs, reference=reference, force=self.inputs.force[samples])
@@ -203,7 +204,7 @@ class Problem:
         return starts
 
     def _record(self, flat: Mapping[str, Any], runs: DrivenRuns) -> Simulated:
-        """Pick position, velocity and force out of finished runs; NaN for runs that failed."""
+        """Extract position, velocity and force from finished runs; NaN for runs that failed."""
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
         force = runs.held[:, :, held.index(HELD_FORCE)] if HELD_FORCE in held else self._force(flat, runs)
@@ -211,7 +212,7 @@ class Problem:
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
-        """Return the force [N] of a controller in continuous time, from the states at the samples."""
+        """Compute the force [N] of a continuous-time controller from states at the samples."""
         count = runs.states.shape[1]
         if not self.closed:
             return self._holding_force(runs)
@@ -232,7 +233,7 @@ class Problem:
     def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
         """Return the force [N] of the controller that drives a stage along a log, shape (runs, n).
 
-        The motion is smoothed like that of the log, so that the rounding of a reversal makes no force.
+        The simulated motion is smoothed like the log's, so that blurred reversals of the log cause no force.
         """
         step = self.inputs.sample_time
         position = smoothed(runs.states[:, :, self.kernel.position], step, self.cutoffs[0])
@@ -243,8 +244,7 @@ class Problem:
 def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
     """Set up the stage with its own controller on the log's reference.
 
-    A `disturbance` in the log acts beside it. The beginning does not count while the loop still shows how it was
-    started.
+    A logged `disturbance` force acts as well. The beginning is left out until the loop has forgotten its initial state.
     """
     sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
     samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
@@ -278,11 +278,12 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
-    """Set up the stage under the logged force, driven along the smoothed logged position by a slow controller.
+    """Set up the stage under the logged force, guided along the smoothed logged position.
 
-    `bandwidth` [Hz] is that of the motion. A faster controller, or noise, would shake the bristles of a stage at rest.
-    A log determines neither whether its force is held between samples or interpolated, nor how smooth its motion was:
-    these stay unsettled. Raises InputError for a log that never moves for long enough.
+    A slow controller guides the stage, because a fast one, or noise, would shake the bristles of a stage at rest.
+    `bandwidth` [Hz] is the motion's. A log determines neither whether its force is held between samples or
+    interpolated, nor how smooth its motion was: these stay unsettled. Raises InputError for a log that never moves for
+    long enough.
     """
     identification_settings = IdentificationSettings.current()
     settings = OutputErrorSettings.current()
@@ -290,11 +291,11 @@ def tracking(
     settling, step = settings.time_constants_of_settling / omega, log.sample_time
     cutoffs = [identification_settings.smoothing_bandwidths * times * bandwidth for times in settings.smoothing_steps]
     smooth, *sharper = (motion(log["position"][part], step, cutoff).position for cutoff in cutoffs)
-    # held from each sample to the next
+    # the force is held from each sample to the next
     held = abs(flat.get("drive.sample_time", np.inf) / step - 1) < settings.sample_time_tolerance
     inputs = Inputs(smooth, log["force"][part], step, held)
     counted = _moving(log["position"][part], smooth, step, settling)
-    counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # what is smoothed lacks the samples behind the end
+    counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
     if not counted.any():
         actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
         expected = "moves that last longer: is the time, or the position, in another unit?"
@@ -319,10 +320,10 @@ def tracking(
 
 
 def _shaking(log: Log, part: slice, cutoff: float) -> float:
-    """Return the noise [m/s] of the velocity below `cutoff` [Hz] that counts beside the noise of a log's force.
+    """Return the velocity noise [m/s] below `cutoff` [Hz] that matters beside the force noise.
 
-    That of an integrated velocity counts, since it adds up in the position, and that of the position where the force is
-    a command without any noise.
+    Noise counts if the velocity was integrated, since it accumulates in the position, or if the force is a command
+    without noise of its own.
     """
     band = min(cutoff, 0.5 / log.sample_time)
     if log.is_integrated:
@@ -333,9 +334,9 @@ def _shaking(log: Log, part: slice, cutoff: float) -> float:
 
 
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
-    """Return 1 where a motion, shape (n,) [m], moves, and 0 where it rests.
+    """Return 1 where a position [m], shape (n,), moves, and 0 where it rests.
 
-    A sticking stage is within micrometres of the log, and the guiding controller then shows that distance instead of a
+    While a stage sticks, the guiding controller's force shows micrometres of distance to the log, not an unexplained
     force. So rests do not count, nor does the time `settling` [s] after each rest and after the beginning.
     """
     settings = OutputErrorSettings.current()
@@ -351,8 +352,7 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
 def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
     """Return the standard deviation [m] of the noise of a position, shape (n,).
 
-    It is the difference to a `smooth` position, or, with little smoothing, the part that neighbouring samples do not
-    share.
+    The noise is the difference to the `smooth` position or, with little smoothing, the difference between neighbours.
     """
     return max(robust(position - smooth), noise_of(position))
 

@@ -19,9 +19,9 @@ WORSE = float(chi2.ppf(0.95, 1))
 class Profile:
     """Cost of a fit as one parameter is moved away, with all others refitted.
 
-    `values` of the parameter, ascending [SI], have `cost`, the mean squares of the residual [N^2], which is at most
-    `limit` inside the 95 % interval. `low` and `high` are the interval's ends, or those of the range if it does not end
-    before (`open_low`, `open_high`).
+    `values` of the parameter ascend [SI]; `cost` has the mean square of the residual [N^2] at each. Inside the 95 %
+    interval the cost is at most `limit`. `low` and `high` are the interval's ends; `open_low` and `open_high` mark ends
+    that are only the range's.
     """
 
     name: str
@@ -37,8 +37,8 @@ class Profile:
 def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
     """Profile parameter `number`, with the `others` fitted at each of its values.
 
-    `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
-    or over the whole range. Returns the profile and the fits behind it.
+    `best` is the mean square [N^2] of the fit that others are compared with. The values reach beyond the interval's
+    ends, or over the whole range. Returns the profile and the fits behind it.
     """
     settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
@@ -61,7 +61,7 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
-    """Fit the other parameters at each value of one, shape (values,), as far as the `limit` can be reached."""
+    """Fit the other parameters at each value of one, unless the cost stays above `limit`."""
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
@@ -88,9 +88,9 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
 
 def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.ndarray:
-    """Return the shift of the others per shift of a number by the derivatives of the fit, shape (others,).
+    """Return how far the other numbers shift per shift of one, to first order, shape (others,).
 
-    It is 0 for a number that is not fitted.
+    The shifts are 0 if the number is not fitted.
     """
     if number not in fit.free:
         return np.zeros(len(others))
@@ -103,7 +103,7 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Find where a profile crosses the limit on both sides of its minimum, and on which sides it does not."""
+    """Find where a profile crosses the limit on either side of its minimum, if it does."""
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]
     inside = cost <= max(limit, cost[lowest])
@@ -118,7 +118,7 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
     """Find where a profile crosses the limit between two values.
 
-    The square root of the excess grows in proportion to the distance.
+    Between them, the square root of the excess cost is taken to grow linearly with distance from the best fit.
     """
     if not np.isfinite(cost[outside]):
         return values[inside]

@@ -1,4 +1,4 @@
-"""Refine many starts at once by Levenberg-Marquardt, with the sensitivities of all starts in lanes."""
+"""Refine many starts at once by Levenberg-Marquardt; the runs of all starts are simulated side by side."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from friso.identification.output_error.settings import OutputErrorSettings
 from friso.progress import Progress, silent
 
 LADDER = np.array([0.1, 1.0, 10.0, 100.0])
-"""Dampings that are tried at once, in units of the previous best one."""
+"""Levenberg-Marquardt dampings that are tried at once, relative to the previous best damping."""
 
 
 @dataclass(frozen=True)
 class Refined:
-    """Refined numbers, (starts, parameters), and mean squares of residuals [N^2], (starts,)."""
+    """Refined numbers, (starts, parameters), and their mean square residuals [N^2], (starts,)."""
 
     inner: np.ndarray
     cost: np.ndarray

@@ -30,8 +30,7 @@ def as_far_off_as_repeated(
     Noise of position and force shifts break-aways, which biases the fit to one side in a way that a Jacobian does not
     show (parametric bootstrap: Efron, Tibshirani 1993, chapter 6).
 
-    If the fit leaves more than those to the simulated logs, errors are scaled up by that ratio: coarse resolution of
-    the force moves the fit of the true machine further.
+    If the residual of the log exceeds the residuals of the simulated logs, errors are scaled up by the ratio.
     """
     settings = OutputErrorSettings.current()
     free = np.isin(np.arange(len(once.inner)), once.free)
@@ -55,8 +54,8 @@ def as_far_off_as_repeated(
 def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     """Widen the damping of the bristles by the effect of one sample of delay.
 
-    This is for a stage that followed a log which it does not explain to its noise: a delay passes for damping, times
-    the stiffness.
+    A delay looks like bristle damping of delay times bristle stiffness. The widening is for a stage that followed a log
+    without explaining it to its noise.
     """
     if not {*BRISTLES} <= {*fit.fitted}:
         return fit
@@ -72,7 +71,7 @@ def _simulated_logs(
 ) -> Iterator[Problem]:
     """Yield problems with simulated logs of the fitted machine.
 
-    Their force is that of the log and of the guiding controller, their position is the stage's own, and both have the
+    A simulated log has the logged force plus the guiding controller's, and the stage's own position, both with the
     log's noise. A force whose resolution is coarser than its noise has errors of rounding instead.
     """
     settings = OutputErrorSettings.current()

@@ -20,10 +20,10 @@ METHOD = "output error"
 
 
 def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Turn a fit into estimates of keys of the stage file, with the correlation of the determined ones.
+    """Turn a fit into estimates of stage-file keys, with the correlation of the determined keys.
 
-    Intervals reach as far as profiles do, and allow for the linearity of sensors. Quantities that the record does not
-    determine have a range with the reason.
+    Intervals are at least as wide as the profiles' and allow for the linearity error of sensors. Quantities that the
+    record does not determine have a range with the reason.
     """
     reading_settings = ReadingSettings.current()
     settings = OutputErrorSettings.current()
@@ -66,9 +66,9 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return deviations that reach as far as the upper end of an interval of the logarithm.
+    """Turn deviations of logarithms into deviations of values that reach the interval's upper end.
 
-    About half a value, such an interval reaches 0.65 of the value above it and 0.4 below.
+    An interval of half a value each way in the logarithm reaches 0.65 of the value above and 0.4 below.
     """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
@@ -77,7 +77,7 @@ def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray
 
 
 _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
-"""Parameters behind keys with another name."""
+"""Fitted parameter behind each stage-file key whose name differs from its parameter's."""
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
@@ -136,9 +136,11 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """Return the plausible range of a key that is not determined, that of any bearing.
+    """Return the range [SI] of an undetermined parameter that is plausible for any bearing.
 
-    The fitted value compensates for what the model lacks, and is no bound.
+    `owner` is the parameter's name.
+
+    The fitted value is no bound, because it compensates for what the model lacks.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]
@@ -149,7 +151,7 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
         ends = level.inner(level.low), level.inner(level.high)
         least, most = (float(level.outer(np.clip(fit.inner[number] + end, *ends))) for end in (-off, off))
         return least * parameter.low, most * parameter.high
-    if owner == "friction.bristle_damping":  # believed of a share of critical damping, whatever the stiffness
+    if owner == "friction.bristle_damping":  # the range is one of damping ratios
         stiffness = parameters["friction.bristle_stiffness"]
         softer, stiffer = (np.sqrt(end / fit.problem.flat[stiffness.name]) for end in (stiffness.low, stiffness.high))
         return float(parameter.low * softer), float(parameter.high * stiffer)

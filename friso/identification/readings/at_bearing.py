@@ -1,7 +1,6 @@
 """Convert the drive's command and the sensor's signal to force and motion of the body on the bearing.
 
-Records are compared below a cut-off; friction depends on the whole motion, which is kept up to a few times that
-frequency.
+Forces are compared below a cut-off; the motion, on which friction depends, is kept up to a few times the cut-off.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ HELD = "The joint is assumed held, with the limiter's stiffness: no bending show
 class StructureMode:
     """First mode of a structure, on the side of the force and the sensor.
 
-    A fraction `share` of the moving mass stands on a spring; `frequency` [Hz] and damping ratio are those of that part
-    with the rest held.
+    A fraction `share` of the moving mass stands on a spring; `frequency` [Hz] and damping ratio describe this part
+    while the rest is held.
     """
 
     share: float
@@ -40,10 +39,10 @@ class StructureMode:
 class Between:
     """Elements between the commanded force and the bearing.
 
-    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] are the drive's. `mass` [kg] is the assumed
-    moving mass, of which the fraction `beyond` is beyond the joint; `contact` [N/m] is the stiffness of what holds the
-    joint, and `joint` [N/m] that of the joint itself. `mode` is that of the structure. `viscous` has the viscous
-    friction [N s/m] and the half-width of its interval.
+    `delay` [s] (None: not known) and `bandwidth` of the current loop [Hz] describe the drive. `mass` [kg] is the
+    assumed moving mass, of which the fraction `beyond` is beyond the joint; `contact` [N/m] is the stiffness of the
+    limiter that holds the joint, `joint` [N/m] the joint's own. `mode` is the structural mode. `viscous` has the
+    viscous friction [N s/m] and the half-width of its interval.
     """
 
     delay: float | None = None
@@ -57,14 +56,14 @@ class Between:
 
 
 DIRECT = Between()
-"""The case without anything in between; the delay is not known."""
+"""No elements between commanded force and bearing; the delay is not known."""
 
 
 def machine_between(flat: Mapping[str, Any]) -> Between:
     """Return the elements between the commanded force and the bearing, from a stage's flat keys.
 
-    A joint counts as held by its limiter. The parasitic frequency is that of both parts of the stage's mass against
-    each other; with one part held, that of the other is lower.
+    A joint counts as held by its limiter. The stage file's parasitic frequency is of both parts of the mass against
+    each other; with one part held, the other's frequency is lower.
     """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
@@ -100,8 +99,8 @@ def believed_between(prior: Prior, log: Log) -> Between:
 class BearingRecord:
     """A stretch of a log of a body on a bearing.
 
-    Over `time` [s] it has the position [m] of the body on which the force acts, the deflection [m] of the joint that
-    carries it (None: it is held), and the force [N], each of shape (n,).
+    Over `time` [s] the record has the position [m] of the body on which the force acts, the deflection [m] of the joint
+    that carries this body (None: the joint is held), and the force [N], each of shape (n,).
     """
 
     time: np.ndarray
@@ -111,12 +110,12 @@ class BearingRecord:
 
     @property
     def interval(self) -> float:
-        """Time between samples [s]."""
+        """Return the time between samples [s]."""
         return float(self.time[1] - self.time[0])
 
     @property
     def body(self) -> np.ndarray:
-        """Return the position [m] of the body on the bearing, shape (n,), apart from the deflection of a contact."""
+        """Return the position [m] on the bearing, shape (n,), without the deflection of a contact."""
         return self.position if self.bent is None else self.position - self.bent
 
     def beginning(self, count: int) -> BearingRecord:
@@ -149,7 +148,7 @@ class LowPass:
         return slice(edge, len(self.time) - edge)
 
     def __call__(self, signal: np.ndarray) -> np.ndarray:
-        """Return a signal, shape (n,), low-passed, without what the ends touch."""
+        """Return a signal, shape (n,), low-passed, without the samples that the ends affect."""
         return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
 
 
@@ -188,7 +187,7 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 
 
 def cutoff_of(record: BearingRecord) -> float:
-    """Choose the low-pass [Hz] for a record: where its motion ends, unless it is too short."""
+    """Choose the low-pass [Hz]: the bandwidth of the motion, unless the record is too short."""
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
     return max(
@@ -200,8 +199,8 @@ def cutoff_of(record: BearingRecord) -> float:
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return position [m], force [N] and acceleration [m/s^2] at the bearing, each (n,).
 
-    The force is delayed to its arrival. The acceleration times the whole moving mass is the inertia. `mass` [kg]
-    determines the force through a compliant contact.
+    The force is delayed by drive and current loop. The acceleration times the whole moving mass is the inertia force.
+    `mass` [kg] determines the force through a compliant contact.
     """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
@@ -220,7 +219,8 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """Return the measured deflection [m] of a joint that bends.
 
-    None if it is not measured, or if it is held and about what its contact `gives` [m].
+    Returns None if the deflection is not measured, or if the joint is held and deflects no more than its contact
+    `gives` [m].
     """
     settings = ReadingSettings.current()
     measured = deflection(log)
@@ -243,7 +243,7 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """Return the force [N] that arrives from a command [N], shape (n,), after delay and current loop."""
+    """Return the force [N], shape (n,), that follows a command after delay and current loop."""
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late
@@ -253,7 +253,7 @@ def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) 
 
 
 def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
-    """Return the acceleration of the mass of a mode, from the acceleration [m/s^2] of its base."""
+    """Compute the acceleration [m/s^2] of a mode's mass from the acceleration of its base."""
     settings = ReadingSettings.current()
     omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / settings.points_per_sample
     fine = CubicSpline(time, acceleration)(

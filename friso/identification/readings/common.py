@@ -19,10 +19,10 @@ from friso.identification.readings.settings import ReadingSettings
 from friso.intervals import COVERAGE
 
 ORDER = 2
-"""Order of the low-pass filter, which is applied forward and back: 4 in total."""
+"""Order of the Butterworth low-pass filter. It is applied forward and backward, which makes 4 in total."""
 
 NORMAL_MAD = 1.4826
-"""Standard deviation over median absolute deviation, of a normal distribution."""
+"""Ratio of standard deviation to median absolute deviation for a normal distribution."""
 
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
@@ -45,7 +45,7 @@ def record(name: str, sample_time: float, **signals: Any) -> Log:
 
 
 def channel(log: Log, role: str) -> np.ndarray:
-    """Return the values of a role, in its SI unit and finite, shape (n,).
+    """Return the signal of a role, checked to be finite and in its SI unit, shape (n,).
 
     Raises InputError otherwise.
     """
@@ -63,9 +63,9 @@ def channel(log: Log, role: str) -> np.ndarray:
 
 
 def deflection(log: Log) -> np.ndarray | None:
-    """Return the position of the stage minus that of the cart [m], shape (n,).
+    """Return the stage's position minus the cart's [m], shape (n,).
 
-    It is measured, or that of two sensors; None without either.
+    The result is measured, or the difference of two sensors; None without either.
     """
     return _apart(log, "relative_position", "cart_position")
 
@@ -73,20 +73,20 @@ def deflection(log: Log) -> np.ndarray | None:
 def cart(log: Log) -> np.ndarray | None:
     """Return the position of the cart [m], shape (n,).
 
-    It is measured, or that of two sensors; None without either.
+    The result is measured, or the difference of two sensors; None without either.
     """
     return _apart(log, "cart_position", "relative_position")
 
 
 def _apart(log: Log, role: str, other: str) -> np.ndarray | None:
-    """Return the values of a role, or the position less the `other` one; None without either."""
+    """Return the signal of a role, or the position minus the `other` role's; None without either."""
     if role in log:
         return channel(log, role)
     return channel(log, "position") - channel(log, other) if {"position", other} <= log.signals.keys() else None
 
 
 def on_bearing(log: Log) -> np.ndarray:
-    """Return the position [m] of the body on the bearing, shape (n,): of the cart, if measured."""
+    """Return the position [m] of the body on the bearing, shape (n,): the cart's, if measured."""
     moved = cart(log)
     return channel(log, "position") if moved is None else moved
 
@@ -94,8 +94,7 @@ def on_bearing(log: Log) -> np.ndarray:
 def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     """Low-pass values forth and back, without phase shift, at `cutoff` [Hz] (Butterworth).
 
-    A record sampled too slowly to hold anything above the cut-off, or shorter than the ends of the filter, is returned
-    as it is.
+    Records sampled too slowly to contain anything above the cut-off, or shorter than the filter's ends, are unchanged.
     """
     if cutoff >= 0.45 / sample_time:
         return values
@@ -106,7 +105,7 @@ def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarra
 
 @lru_cache(maxsize=16)
 def _butterworth(sample_time: float, cutoff: float) -> np.ndarray:
-    """Return the sections of the low-pass; a fit asks for the same ones at every step."""
+    """Return the low-pass filter as second-order sections (cached for repeated fits)."""
     return np.asarray(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"))
 
 
@@ -152,7 +151,7 @@ def robust(values: np.ndarray) -> float:
 def noise_of(signal: np.ndarray) -> float:
     """Return the standard deviation of the noise of a force [N] or a position [m], shape (n,).
 
-    It is the part that neighbouring samples do not share, by third differences, or that of the resolution.
+    The noise is estimated from third differences, to which smooth motion adds little; it is at least the resolution's.
     """
     rough, digit = np.abs(np.diff(signal, 3)), digit_of(signal)
     white = NORMAL_MAD * _median(rough, digit) / np.sqrt(20) if rough.size else 0.0
@@ -160,9 +159,9 @@ def noise_of(signal: np.ndarray) -> float:
 
 
 def _median(sizes: np.ndarray, digit: float) -> float:
-    """Return the median of sizes that were rounded to multiples of `digit`, as of grouped data.
+    """Return the median of sizes that were rounded to multiples of `digit` (grouped data).
 
-    Each size stands for all within half a step, none of which is below 0.
+    Each rounded size stands for all sizes within half a digit of it, none below 0.
     """
     middle = float(np.median(sizes))
     low = max(middle - digit / 2, 0.0)
@@ -173,9 +172,8 @@ def _median(sizes: np.ndarray, digit: float) -> float:
 def digit_of(signal: np.ndarray) -> float:
     """Return the resolution of a signal, shape (n,).
 
-    It is the spacing of the levels at which the signal stays, if these are multiples of one step, which interpolation
-    does not change; else the smallest step. A signal that mostly stays at a few levels is a command in steps and has no
-    resolution.
+    The resolution is the common step of the levels at which the signal stays (interpolation does not change it), else
+    the smallest step. A signal that mostly stays at a few levels is a stepped command and has no resolution.
     """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
@@ -198,7 +196,7 @@ def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
     turns, values = [], position.tolist()
     lowest = highest = values[0]
     low = high = 0
-    rises = falls = True  # what it may do until it has done either
+    rises = falls = True  # the direction is open until the motion has gone either way by the swing
     for k, value in enumerate(values):
         if value > highest:
             highest, high = value, k
@@ -221,7 +219,7 @@ def runs(mask: np.ndarray) -> list[slice]:
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean, its standard error and the degrees of freedom of that."""
+    """A mean, its standard error, and the degrees of freedom of the standard error."""
 
     value: float
     error: float
@@ -242,7 +240,7 @@ def block_mean(values: np.ndarray) -> Mean:
 def correlated_mean(values: np.ndarray) -> Mean:
     """Return the mean of values in a row that may be correlated with their predecessors.
 
-    The degrees of freedom are those of the equivalent number of independent values, by a first-order autoregression.
+    The degrees of freedom follow from the equivalent number of independent values (first-order autoregression).
     """
     settings = ReadingSettings.current()
     count = len(values)
@@ -264,16 +262,19 @@ def t_value(freedom: float) -> float:
 
 
 def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
-    """Make an estimate with Student's interval, widened by systematic errors `low` below and `high` above the mean."""
+    """Make an estimate with Student's 95 % interval, widened by systematic errors.
+
+    `low` and `high` are the systematic errors below and above the mean, in its `unit`.
+    """
     half = t_value(mean.freedom) * mean.error
     ends = (mean.value - half - low, mean.value + half + high)
     return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
 
 
 def solve_normal_equations(square: np.ndarray, product: np.ndarray) -> np.ndarray:
-    """Solve normal equations, shape (p, p) and (p,), whose columns are of very different size.
+    """Solve normal equations, shape (p, p) and (p,), whose columns differ widely in size.
 
-    The solution of a column that is empty is 0.
+    The solution for an empty column is 0.
     """
     size = np.sqrt(np.maximum(np.diag(square), 0.0))
     size = np.where(size > 0, size, 1.0)
@@ -315,7 +316,7 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
     start from the deflection `start` [m]. The solution is exact in each move.
     """
     kept = np.exp(-np.abs(moves) / ends)
-    after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
+    after = np.append(start, np.sign(moves) * ends * (1 - kept))  # by each move alone
     bands = np.stack([np.ones(len(after)), np.append(-kept, 0.0)])
     return np.asarray(solve_banded((1, 0), bands, after, check_finite=False))
 
@@ -329,7 +330,7 @@ def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 def stribeck_curve(
     speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
 ) -> np.ndarray:
-    """Return friction [N] at steady speeds [m/s] by Eq. 4 of the thesis, without the viscous part.
+    """Return friction [N] at steady speeds [m/s], without the viscous part (thesis, Eq. 4).
 
     Arguments are Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent.
     """

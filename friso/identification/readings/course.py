@@ -1,4 +1,4 @@
-"""Describe the course of a log without a stated kind: whether its reference moves, and what repeats."""
+"""Describe a log whose kind of experiment is not stated: whether its reference moves, and what repeats."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from friso.identification.response.period import find_periods
 
 @dataclass(frozen=True)
 class Repetition:
-    """Repetition in a log.
+    """Periodic repetition in a log.
 
-    The period is `samples` long, with about so many `harmonics` and turns, while the position rests for a fraction of
-    the time.
+    A period has `samples` samples, about so many `harmonics`, and turns of direction; the position rests for a fraction
+    of the time.
     """
 
     samples: int
@@ -44,7 +44,7 @@ class Course:
 
     @property
     def signal(self) -> str:
-        """Return the role of the signal that drives the log: injected force, moving reference, or force."""
+        """Return the role of the driving signal: injected force, moving reference, or force."""
         return external(self.log) or "force"
 
     @cached_property
@@ -61,7 +61,7 @@ class Course:
 
     @cached_property
     def speeds(self) -> np.ndarray:
-        """Return the constant speeds [m/s], shape (n,), if most of the way is covered at such speeds.
+        """Return the constant speeds [m/s], shape (n,), if they cover most of the way.
 
         The reference is not used; the result is empty if the position has no SI unit.
         """
@@ -80,7 +80,7 @@ class Course:
     def ramps(self) -> int:
         """Return how often the force rises evenly from zero until the body moves off.
 
-        The result is 0 if this is not most of the log, if a reference moves, or if the position has no SI unit.
+        The result is 0 if ramps are a small part of the log, if a reference moves, or if the position has no SI unit.
         """
         settings = ReadingSettings.current()
         log = self.log
@@ -95,9 +95,9 @@ class Course:
         return len(even) if sum(even) > settings.log_share_of_ramps * len(log.time) * log.sample_time else 0
 
     def _from_none(self, at: float, force: float, lasts: float) -> bool:
-        """Tell whether the force rests at zero and then rises evenly up to an instant [s].
+        """Tell whether the force rests at zero and then rises evenly until the time `at` [s].
 
-        The rise lasts for the given time [s].
+        The rise to `force` lasts for `lasts` [s].
         """
         settings = ReadingSettings.current()
 
@@ -120,7 +120,7 @@ class Course:
         return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
-        """Tell whether the force changes less over a stretch than it is.
+        """Tell whether a body slides: the force changes by less than its mean over a stretch.
 
         Otherwise a spring, such as bristles before sliding, determines the speed.
         """
@@ -161,7 +161,7 @@ class Course:
 
 
 def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
-    """Tell whether forces at places of successive rests, shape (n,), rise as a spring's do, from either side."""
+    """Tell whether forces at successive rest positions, shape (n,), rise as a spring's do."""
     settings = ReadingSettings.current()
     if len(places) < settings.places_of_a_spring or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
         return False
@@ -182,7 +182,7 @@ def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
 
 
 def external(log: Log) -> str | None:
-    """Return the role of the external signal of a loop: injected force or moving reference; None without one."""
+    """Return the role of a loop's external signal (injected force or moving reference), or None."""
     roles = ("disturbance", "reference")
     return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
@@ -190,7 +190,7 @@ def external(log: Log) -> str | None:
 def _harmonics(period: np.ndarray) -> float:
     """Return the effective number of harmonics of one period of a signal, shape (samples,).
 
-    It is the number of harmonics of equal power with the same spread.
+    It is the number of equally strong harmonics with an equal spread of power.
     """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))

@@ -1,7 +1,7 @@
-"""Read friction over the place on the rail, at constant speed, and decide whether it can be read (thesis, Fig. 21).
+"""Read friction along the rail at constant speed, and decide whether the log allows it (thesis, Fig. 21).
 
-The actuator force is friction only if the motion is steady and the loop fast enough; it is friction of the rail, not
-oscillation of the loop, if passes over the same places repeat it.
+The actuator force equals friction only if the motion is steady and the loop fast enough. If passes over equal places
+repeat the force, it is friction of the rail, not oscillation of the loop.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from friso.intervals import COVERAGE
 class Harmonic:
     """A periodic variation of friction along the way.
 
-    It has a wavelength [m], an amplitude [N], and the frequency [Hz] at which it appears at the speed of the log.
+    Fields are wavelength [m], amplitude [N], and the frequency [Hz] at which the variation appears at the log's speed.
     """
 
     wavelength: float
@@ -37,8 +37,8 @@ class Harmonic:
 class PassMap:
     """Friction along the rail in one pass.
 
-    It has the velocity [m/s]; the force [N] over `places` [m], NaN outside the pass; mean force and standard deviation
-    [N], correlation length [m]; the strongest harmonics; and whether the motion was steady.
+    Fields are the velocity [m/s]; the force [N] over `places` [m], NaN outside the pass; mean and standard deviation of
+    the force [N]; correlation length [m]; the strongest harmonics; and whether the motion was steady.
     """
 
     velocity: float
@@ -55,9 +55,9 @@ class PassMap:
 class FrictionPosition:
     """Friction along the rail in several passes.
 
-    `repeatability` is the mean correlation of the maps of pairs over the same places, and `pairs` has that of every
-    pair as (first, second, correlation). Dynamic friction can be `separated` or not, and a sentence, the `verdict`,
-    says so.
+    `pairs` has the correlation of the maps of every pair of passes over common places, as (first, second, correlation);
+    `repeatability` is their mean. `separated` tells whether the force is friction of the rail, and `verdict` says so in
+    a sentence.
     """
 
     passes: tuple[PassMap, ...]
@@ -77,8 +77,8 @@ class FrictionPosition:
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
     """Read friction along the rail from passes at constant velocity, without inertia.
 
-    Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also considers whether it is
-    fast enough for the oscillations seen. Raises InputError for missing channels.
+    Inertia is `mass` [kg] times acceleration. With the loop's `crossover` [Hz] the verdict also considers whether the
+    loop is fast enough for the variations seen. Raises InputError for missing channels.
     """
     settings = ReadingSettings.current()
     stretches = passes(log)
@@ -111,7 +111,7 @@ def _map(
 ) -> PassMap:
     """Return the mean force by place in one pass.
 
-    Places are met once, or several times where the motion goes back a little.
+    A place may be passed several times where the motion goes back a little.
     """
     x, f = position[stretch.span], force[stretch.span]
     smooth = low_pass(x, sample_time, ReadingSettings.current().low_pass_of_passes)
@@ -123,7 +123,7 @@ def _map(
         mapped = np.where(count > 0, np.bincount(bins, f, minlength=len(places)) / count, np.nan)
     inside = np.arange(bins.min(), bins.max() + 1)
     covered = inside[count[inside] > 0]
-    mapped[inside] = np.interp(inside, covered, mapped[covered])  # places passed between two samples
+    mapped[inside] = np.interp(inside, covered, mapped[covered])  # fill places without samples
     row = mapped[inside]
     mean = by_t("friction force along the rail", "N", block_mean(row), "mean over position by blocks")
     flat = row - np.polyval(np.polyfit(inside, row, 1), inside)
@@ -142,7 +142,7 @@ def _map(
 def _length(fields: np.ndarray) -> np.ndarray:
     """Return the lag at which the autocorrelation of each field falls to 1/e, shape (fields,).
 
-    Lags count places. NaN if the autocorrelation does not fall that far.
+    The lag is a number of places, NaN if the autocorrelation does not fall that far.
     """
     count = fields.shape[1]
     power = np.abs(np.fft.rfft(fields, 2 * count, axis=1)) ** 2
@@ -158,8 +158,8 @@ def _length(fields: np.ndarray) -> np.ndarray:
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Estimate the correlation length of the force along the rail.
 
-    Over that length its autocorrelation falls to 1/e. The interval is the ratio of found to true length for random
-    fields with exponential correlation, detrended in the same way.
+    Over the correlation length the autocorrelation falls to 1/e. The interval follows from the ratio of estimated to
+    true length in simulated random fields with exponential correlation, detrended likewise.
     """
     settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
@@ -181,7 +181,7 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
 
 
 def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, ...]:
-    """Return the strongest lines of the spectrum over the place."""
+    """Return the strongest spectral lines of the force over the place on the rail."""
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
     best = inner[np.argsort(power[inner])[::-1][: ReadingSettings.current().harmonics_of_a_pass]]
@@ -191,7 +191,7 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
 def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
     """Return the correlation of each pair of maps that share half of the shorter one's places.
 
-    Maps are detrended. Passes in opposite directions are compared by the friction against the motion.
+    Maps are detrended. For passes in opposite directions, friction against the motion is compared.
     """
     pairs = []
     for (i, first), (j, second) in combinations(enumerate(maps), 2):
@@ -207,16 +207,16 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 
 def _no_repeatability(reason: str) -> Estimate:
-    """Return the repeatability as not determined, with the reason."""
+    """Return an undetermined repeatability, with the reason."""
     return Estimate.unknown(
         "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
 
 
 def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float], ...]) -> Estimate:
-    """Return the mean correlation of the pairs, by Fisher's z.
+    """Estimate the mean correlation of the pairs, with its interval by Fisher's z.
 
-    It has as many independent places as correlation lengths in a pass.
+    The number of independent places is the number of correlation lengths in a pass.
     """
     if not pairs:
         return _no_repeatability("no two passes over the same places")

@@ -22,9 +22,9 @@ METHOD = "mean forces over stretches of constant velocity"
 class Direction:
     """Friction over speed in one direction, or in both together.
 
-    It has Coulomb [N], viscous [N s/m] and static [N] friction, Stribeck velocity [m/s] and exponent, with the
-    covariance of the fitted ones (in that order, SI), shape (2, 2), (4, 4) or (5, 5), or (0, 0); and the `curve`, None
-    if a straight line fits as well.
+    Fields are Coulomb [N], viscous [N s/m] and static [N] friction, Stribeck velocity [m/s] and exponent; the
+    covariance of the fitted ones in this order (SI), shape (0, 0), (2, 2), (4, 4) or (5, 5); and the Stribeck `curve`,
+    None if a straight line fits as well.
     """
 
     coulomb: Estimate
@@ -40,12 +40,12 @@ class Direction:
 class FrictionVelocity:
     """Friction over speed, in both directions, with its data.
 
-    The directions "forward" and "backward" include the constant force in their Coulomb friction; `both` together
-    exclude it, and `bias` [N] is the constant force on the body as in the stage file.
+    `forward` and `backward` include the constant force in their Coulomb friction; `both` excludes it, and `bias` [N] is
+    the constant force on the body as in the stage file.
 
-    Per steady stretch, shape (n,), there are velocity [m/s], mean force [N] less inertia and half-width of its 95 %
-    interval [N]; `unsteady` are velocities of stretches that were not steady, shape (m,), and `places` [m] the ends
-    between which the steady ones were read.
+    Per steady stretch, shape (n,), there are the velocity [m/s], and the mean force [N] without inertia with the
+    half-width of its 95 % interval [N]. `unsteady`, shape (m,), has the velocities of unsteady stretches; `places` [m]
+    are the ends of the way over which steady stretches were read.
     """
 
     directions: Mapping[str, Direction]
@@ -91,9 +91,10 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
-    """Return velocity [m/s], friction [N] without inertia, its half-width [N], and relative swing of a pass.
+    """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    The mean of a curve over a swing is off by the square of the swing, relative to the fall of the curve.
+    Inertia is subtracted. Where the velocity swings, the mean friction errs in proportion to the squared relative
+    swing, which widens the interval.
     """
     return (
         stretch.velocity,
@@ -106,10 +107,10 @@ def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
 def _together(
     velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
 ) -> tuple[Estimate, Direction, bool]:
-    """Separate the constant force from friction, and tell whether forces refute the exponent.
+    """Separate the constant force from friction; tell whether forces refute the exponent.
 
     The constant force follows from least squares of Coulomb, viscous and constant force on all stretches, or with the
-    Stribeck curve if one shows. Also returns the friction of both directions without it.
+    Stribeck curve if one shows. Also returns the friction of both directions without the constant force.
     """
     name, method = "bias", f"{METHOD}, forward and backward"
     sign = np.sign(velocities)
@@ -120,7 +121,7 @@ def _together(
     if np.abs(velocities).max() >= ReadingSettings.current().span_of_speeds * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
-    even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # a curve that the line lacks cancels, there and back
+    even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # curvature cancels between forward and backward motion
     solution, covariance, freedom = _linear(design, forces, even)
     if freedom < 1:
         reason = "too few steady stretches"
@@ -136,9 +137,9 @@ def _together(
 
 
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return the standard deviation [N] of each stretch, at least the median, from half-widths `errors` [N].
+    """Return standard deviations [N] of the forces from half-widths, at least their median.
 
-    A stretch whose velocity swings counts less; one that happens to be even does not count more.
+    A stretch whose velocity swings counts less; a stretch that happens to be very even counts no more than others.
     """
     least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
     return np.maximum(errors, least) / COVERAGE
@@ -163,8 +164,8 @@ def _covariance(
 ) -> np.ndarray:
     """Return the covariance of a solution, by the `inverse` of its design.
 
-    `scatter` is the variance over that of the `deviations` [N], which counts if it is greater than 1; `levels` are the
-    columns for levels of friction.
+    `scatter` is the residual's variance relative to the `deviations` [N], used if above 1; `levels` are the columns for
+    levels of friction.
     """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
@@ -178,7 +179,7 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
 
 
 def _nothing(reason: str) -> Direction:
-    """Return a direction without estimates, with the reason."""
+    """Return undetermined friction for a direction, with the reason."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
     coulomb, viscous, static, velocity, exponent = unknown
@@ -190,8 +191,8 @@ def _direction(
 ) -> Direction:
     """Fit friction over speed for one direction or both.
 
-    Friction [N] is positive against the motion, with half-widths `errors` [N]. `spent` degrees of freedom are already
-    used, for the constant force; `exponent` is the one of the stage, if stated.
+    Friction [N] is positive against the motion, with half-widths `errors` [N]. `spent` is the number of degrees of
+    freedom already used for the constant force; `exponent` is the stage's, if stated.
     """
     settings = ReadingSettings.current()
     speeds = np.abs(velocities)
@@ -234,7 +235,8 @@ def _direction(
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
     """Bound Coulomb and viscous friction if all speeds are about equal and cannot separate them.
 
-    Each one is at most the whole friction force. `spent` is the number of degrees of freedom already used.
+    Coulomb and viscous friction are each at most the whole force. `spent` is the number of degrees of freedom already
+    used.
     """
     count = len(friction)
     half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
@@ -246,7 +248,7 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
 
 
 def distinct(speeds: np.ndarray) -> int:
-    """Count the distinct speeds [m/s], shape (n,): those within a small ratio count as one."""
+    """Count the distinct speeds [m/s], shape (n,); speeds within a small ratio count as one."""
     settings = ReadingSettings.current()
     return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(settings.ratio_of_distinct_speeds)).sum())
 
@@ -264,12 +266,12 @@ def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Directi
 def _fitted(
     name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
 ) -> Estimate:
-    """Make an estimate of one of the numbers of a linear fit."""
+    """Make the estimate of one number of a linear fit, at index `place` of its `solution`."""
     return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
-    """Make estimates for a direction from a Stribeck curve, with intervals that include open parameters.
+    """Make estimates for a direction from a Stribeck curve, with intervals for any open exponent.
 
     Static friction and Stribeck velocity are determined only if speeds reach below the Stribeck velocity.
     """
@@ -294,7 +296,7 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
 
 
 def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) -> Estimate:
-    """Make an estimate from a range; it is not determined if there is a `reason`."""
+    """Make an estimate from the range of a fit; it is not determined if there is a `reason`."""
     key = f"friction.{name}"
     if reason:
         return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)

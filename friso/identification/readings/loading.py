@@ -22,7 +22,7 @@ def stiffness_of_loading(
     low-passed, shape (n,); each of the `loads` lies between two slips.
 
     Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
-    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads the
+    joint. The error is by the jackknife over loads. The cart's creep drops out. With fewer than three loads the
     stiffness is unknown.
     """
     settings = ReadingSettings.current()
@@ -52,7 +52,7 @@ def stiffness_of_loading(
 
 
 def _spring(products: np.ndarray) -> float:
-    """Return the coefficient of the first signal in a fit of the last one by all others.
+    """Fit the last signal by all others, and return the coefficient of the first.
 
     `products` are the scalar products of all signals.
     """

@@ -17,8 +17,8 @@ from friso.identification.readings.settings import ReadingSettings
 class Pass:
     """A stretch of constant velocity in a log.
 
-    It has its `span`, the mean velocity [m/s] and its standard deviation, below and above the cutoff, the mean force
-    [N] by blocks, and the mean acceleration [m/s^2].
+    Fields are the samples (`span`), the mean velocity [m/s], the velocity's standard deviation below and above the
+    cut-off, the mean force [N] by blocks, and the mean acceleration [m/s^2].
     """
 
     span: slice
@@ -30,7 +30,7 @@ class Pass:
 
     @property
     def steady(self) -> bool:
-        """Whether the velocity hardly swings, slowly or quickly."""
+        """Tell whether the velocity hardly swings, slowly or quickly."""
         settings = ReadingSettings.current()
         return self.swing <= settings.swing_of_a_steady_pass * abs(
             self.velocity
@@ -40,7 +40,7 @@ class Pass:
 def passes(log: Log) -> tuple[Pass, ...]:
     """Find all stretches of constant velocity.
 
-    They are stretches of constant velocity of the reference; without a reference, of the body itself. Each pass states
+    The reference decides where the velocity is constant; without a reference, the body's own motion. Each pass states
     whether its motion was steady. Raises InputError for missing position or force.
     """
     settings = ReadingSettings.current()
@@ -61,7 +61,7 @@ def passes(log: Log) -> tuple[Pass, ...]:
 def on_common_places(log: Log, stretches: Sequence[Pass]) -> tuple[Pass, ...]:
     """Cut passes to the way that all of them cover, to compare friction at the same places.
 
-    They stay as they are if that way is too short.
+    Passes stay uncut if the common way is too short.
     """
     settings = ReadingSettings.current()
     position, velocity = on_bearing(log), _velocity(log)
@@ -96,7 +96,7 @@ def _velocity(log: Log) -> np.ndarray:
 
 
 def _of_reference(log: Log, part: slice) -> list[slice]:
-    """Find where the reference moves at one velocity, less what the axis takes to settle on it."""
+    """Find where the reference has constant velocity, without the time in which the axis settles."""
     settings = ReadingSettings.current()
     reference = channel(log, "reference")[part]
     velocity = np.gradient(low_pass(reference, log.sample_time, settings.low_pass_of_passes), log.sample_time)
@@ -109,8 +109,8 @@ def _of_reference(log: Log, part: slice) -> list[slice]:
 def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
     """Find where the body itself keeps its velocity.
 
-    Its acceleration is within the noise there, or small against the largest and its velocity. Where none of a stretch
-    does the latter it swings, and is no less a stretch.
+    Its acceleration is within the noise there, or small compared with the largest acceleration and with its velocity. A
+    stretch that swings throughout counts as well.
     """
     settings = ReadingSettings.current()
     smooth = low_pass(velocity, sample_time, settings.low_pass_of_passes / 2)
@@ -134,7 +134,7 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
     """Return the stretches of a mask without their ends.
 
-    Both ends are cut by what the filter smears, and the start by a further fraction to settle.
+    Both ends are cut by the filter's settling time, and the start by a further fraction for the axis to settle.
     """
     settings = ReadingSettings.current()
     edge, least = (
@@ -172,8 +172,8 @@ def _digit(position: np.ndarray) -> float:
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
     """Return the standard deviation of fast oscillation of the velocity [m/s].
 
-    It is faster than the low-pass shows. Only lines of the spectrum that stand clear of noise count. Less than one
-    digit [m] of the position is no motion.
+    The oscillation is faster than the low-pass of passes. Only spectral lines clear of the noise count. Motion by less
+    than one `digit` [m] of the position does not count.
     """
     settings = ReadingSettings.current()
     window = np.hanning(len(position))
@@ -181,7 +181,7 @@ def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> floa
     frequency = np.fft.rfftfreq(len(position), sample_time)
     above = frequency > settings.low_pass_of_passes + 2 / (
         len(position) * sample_time
-    )  # by half a main lobe of the window
+    )  # separate the lines by half a main lobe of the window
     if not above.any():
         return 0.0
     power = np.where(above & (lines > settings.power_of_a_clear_line * np.median(lines[above])), lines, 0.0)

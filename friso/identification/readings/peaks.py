@@ -1,7 +1,7 @@
-"""Find the largest friction before a break-away in noise, with the best smoothing and its uncertainty.
+"""Find the largest friction before break-away in a noisy force, with its uncertainty.
 
 A maximum over noise reads high, by up to about sqrt(2 ln n) deviations of n independent values; a smoothed peak reads
-low, by the rise of the force within the smoothing. The smoothing is chosen to minimise both together.
+low, by the rise of the force within the smoothing. The smoothing minimises the sum of both errors.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Peak:
 def smoothed(values: np.ndarray, width: float) -> np.ndarray:
     """Smooth values, shape (n,), by a Gaussian of `width` samples.
 
-    The ends go on as they came, mirrored about their last value.
+    Beyond its ends, the signal is continued by point reflection about its end values.
     """
     settings = ReadingSettings.current()
     more = min(int(settings.deviations_of_a_kernel * width) + 1, len(values) - 1)
@@ -43,9 +43,9 @@ def smoothed(values: np.ndarray, width: float) -> np.ndarray:
 
 
 def scatter(values: np.ndarray) -> float:
-    """Return the standard deviation of white noise on slowly changing values; 0 of fewer than 3.
+    """Return the standard deviation of white noise on slow values; 0 for fewer than 3 values.
 
-    It follows from second differences.
+    The deviation is computed from second differences.
     """
     return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6)) if len(values) > 2 else 0.0
 
@@ -66,9 +66,9 @@ def peak(
 ) -> Peak:
     """Find the largest friction before a body breaks away.
 
-    It is the force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and in the
-    direction of the motion, between two `marks` (indices), over the first half of which the body rests. The force rises
-    at `rising` [N/s]; nothing above the `cutoff` [Hz] counts.
+    Friction is the force [N] minus `mass` [kg] times the second derivative of the position [m], both of shape (n,) and
+    positive in the direction of motion. It is searched between two `marks` (indices); the body rests in the first half.
+    The force rises at `rising` [N/s]; frequencies above `cutoff` [Hz] are filtered out.
     """
     settings = ReadingSettings.current()
     begin, start = marks
@@ -82,7 +82,7 @@ def peak(
     low = LOSS * rising * widths * sample_time
     best = int(np.argmin(high + low))
     width = float(widths[best])
-    # second differences of what is smoothed: the Gaussian's own derivative, cut off, does not sum to 0
+    # second differences of the smoothed signal: the derivative of a truncated Gaussian does not sum to 0
     friction = smoothed(force, width) - mass / sample_time**2 * _second(smoothed(position, width))
     at = begin + int(np.argmax(friction[begin : start + 1]))
     return Peak(at, float(friction[at] + (low[best] - high[best]) / 2), float(low[best] + high[best]) / 2)

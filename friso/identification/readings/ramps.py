@@ -17,9 +17,10 @@ from friso.identification.readings.slips import slips
 class Ramps:
     """Ramps of the force from rest, each until the body moves off.
 
-    Per ramp, shape (n,), there are time [s], place [m], direction, break-away force [N] in that direction, force rate
-    [N/s], the error [N] of that force by noise and smoothing to either side, its possible excess if the mass is not
-    known, and the highest speed [m/s] of the body by then. `threshold` [m/s] is that of the speed.
+    Per ramp, shape (n,), there are time [s], place [m], direction, break-away force [N] in this direction, force rate
+    [N/s], the break-away force's error [N] by noise and smoothing to either side, its possible excess [N] if the mass
+    is not known, and the body's highest speed [m/s] until break-away. `threshold` [m/s] is the speed at which motion
+    counts.
     """
 
     times: np.ndarray
@@ -37,8 +38,8 @@ class Ramps:
 def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
     """Find the ramps of the force in a log, each from rest of the body on the bearing.
 
-    With the `mass` [kg] that moves, a break-away force is the greatest friction, force less inertia, as motion begins
-    (the published definition); without, the force where motion begins to be visible, which contains inertia. Raises
+    With the moving `mass` [kg], the break-away force is the greatest friction (force minus inertia) as motion begins,
+    the published definition. Without, it is the force at which motion becomes visible, which contains inertia. Raises
     InputError for a missing channel.
     """
     settings = ReadingSettings.current()
@@ -71,7 +72,7 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
             rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
             at, level, unsure, late = onset, float(direction * pushed[onset]), 0.0, 0.0
             if rising > 0:
-                # friction opposes the motion: the impulse of the force gives the mass its speed at least
+                # friction opposes the motion, so the force's impulse is at least mass times speed
                 heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
                 signals = direction * force[part], direction * body[part]
                 top = peak(
@@ -100,7 +101,7 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 
 def _lowest(push: np.ndarray) -> float:
-    """Return the least push during the rest before a motion, smoothed."""
+    """Return the smallest smoothed push [N] during the rest before a motion."""
     return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 

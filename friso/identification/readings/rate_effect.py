@@ -18,7 +18,7 @@ from friso.identification.readings.settings import ReadingSettings
 from friso.quantities import percent
 
 _SPEEDS = np.geomspace(1e-4, 10, 2001)
-"""Speeds over Stribeck velocity among which the largest force is searched."""
+"""Speeds, relative to the Stribeck velocity, among which the largest force is searched."""
 
 
 def break_away(
@@ -31,10 +31,10 @@ def break_away(
 
 
 def share_below(force_rate: float) -> float:
-    """Return how far break-away may lie below static friction at a force rate [N/s], as a fraction.
+    """Return by which fraction break-away may lie below static friction at a rate [N/s].
 
-    It holds for any Coulomb friction, if bristle stiffness times Stribeck velocity is at least the value in the
-    settings. Returns 1 for rates at which nothing can be concluded.
+    The bound holds for any Coulomb friction, if bristle stiffness times Stribeck velocity is at least the setting
+    `least_bristle_rate`. Returns 1 for rates at which nothing can be concluded.
     """
     return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
 
@@ -60,9 +60,9 @@ def static_friction(
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """Estimate static friction from one rate: the mean break-away is too low by at most a bound.
+    """Estimate static friction from break-aways at one rate, which are too low by a bounded part.
 
-    Half of the bound is added to the value.
+    The value is raised by half of the bound.
     """
     settings = ReadingSettings.current()
     mean = correlated_mean(forces)
@@ -93,10 +93,10 @@ def _slow_enough() -> float:
 
 
 def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None:
-    """Return a bound instead of a value if break-away clearly rises with the force rate; else None.
+    """Return a bound on static friction if break-away clearly rises with the rate; else None.
 
-    No bristles cause that. A motion that is noticed late by a constant time makes forces rise in proportion to the
-    rate: their line at rate 0 and the forces at the lowest rates bound static friction.
+    Bristles make break-away fall with the rate. If motion is noticed late by a constant time, forces rise in proportion
+    to the rate: the line extrapolated to rate 0, and the forces at the lowest rates, bound static friction.
     """
     if len(forces) < 4:
         return None
@@ -118,9 +118,9 @@ def _rising(name: str, forces: np.ndarray, rates: np.ndarray) -> Estimate | None
 
 
 def _extrapolated(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3), fitted at the lower rates.
+    """Extrapolate break-away forces to rate 0 by a straight line over rate^(2/3).
 
-    Half of the extrapolated distance widens the interval.
+    The line is fitted at the lower rates. The interval is widened by half of the extrapolated distance.
     """
     settings = ReadingSettings.current()
     rises = _rising(name, forces, rates)

@@ -1,4 +1,4 @@
-"""Find the starts of slips of a sticking body by its speed, which must stand out of the noise."""
+"""Find the starts of slips of a sticking body, where its speed stands out of the noise."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from friso.identification.readings.settings import ReadingSettings
 class Slips:
     """Starts of slips of a sticking body.
 
-    Indices, each of shape (n,): `onsets` of visible motion (out of the noise, and a hundredth of the highest speed),
-    `starts` of the slip (above the threshold), where the rest before it began, and the fastest sample. `directions` are
-    +1 or -1; `speed` [m/s] is that of the body, shape (samples,), with its `threshold` [m/s] and the fraction of time
-    above it.
+    Sample numbers, each of shape (n,): `onsets` of visible motion (above the noise and a hundredth of the highest
+    speed), `starts` of slips (above the threshold), beginnings of the rests before them, and the fastest samples.
+    `directions` are +1 or -1; `speed` [m/s], shape (samples,), is the body's, with the `threshold` [m/s] and the
+    fraction of time above it.
     """
 
     onsets: np.ndarray
@@ -36,7 +36,7 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)
     slow = speed[size <= np.percentile(size, 50)]
-    noise = robust(slow) * 2  # the slower half of a normal scatter spreads by about half of it
+    noise = robust(slow) * 2  # of normal scatter, the slower half spreads by about half the standard deviation
     threshold = max(
         settings.deviations_of_a_slip * noise, settings.speed_share_of_a_slip * float(size.max(initial=0.0))
     )

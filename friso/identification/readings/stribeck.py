@@ -2,8 +2,8 @@
 
 At a given Stribeck velocity and exponent the curve is linear in all other parameters: least squares are computed over a
 grid of both, and an interval contains every value that explains the forces within chance, for any exponent (profile
-likelihood). An interval by the slope at the best fit is much too narrow, because another exponent with another velocity
-may leave as little.
+likelihood). A linearised interval at the best fit is much too narrow, because another exponent with another velocity
+may fit as well.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Possible:
-    """The best value of a parameter, the range that the forces allow, and whether it is closed."""
+    """A parameter's best value, the range that the forces allow, and whether it is closed."""
 
     value: float
     low: float
@@ -32,9 +32,9 @@ class Possible:
 class FittedStribeck:
     """A Stribeck curve through forces at some speeds, with the remaining ranges.
 
-    The ranges are those of Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the
-    exponent, and the constant force [N] along the axis that made friction too large forward. The covariance is that of
-    the first five (of four with a given exponent), SI; a given exponent may be `refuted`.
+    Ranges are given for Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the
+    exponent, and the constant force [N] that adds to friction in forward motion. The covariance (SI) covers the first
+    five, or four with a given exponent; a given exponent may be `refuted`.
     """
 
     coulomb: Possible
@@ -51,8 +51,8 @@ class FittedStribeck:
 class Forces:
     """Friction [N] against the motion at speeds [m/s], shape (n,), to which a curve is fitted.
 
-    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation that all levels share.
-    Directions may share one curve, beside a constant force.
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. Both
+    directions may share one curve and a constant force.
     """
 
     speeds: np.ndarray
@@ -66,7 +66,7 @@ class Forces:
 def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
     """Fit a Stribeck curve to forces; return None if a straight line fits as well.
 
-    The line leaves `plain` (squares over variances). A given `exponent` is used unless the forces refute it; too few
+    `plain` is the line's sum of squares over variances. A given `exponent` is used unless the forces refute it; too few
     forces leave all exponents possible.
     """
     reading_settings = ReadingSettings.current()
@@ -116,11 +116,11 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
 
 
 class _Grid:
-    """Least squares of all that is linear, at each Stribeck velocity and exponent of a grid.
+    """Least squares of the linear parameters, at each Stribeck velocity and exponent of a grid.
 
     Shapes are (velocities, exponents): `cost` (squares over variances; infinite where friction would not rise towards
-    rest), the solutions (.., p) and their covariance (.., p, p) with all deviations as stated. Exponents taken `apart`
-    are each as good as the best.
+    rest), the solutions (.., p) and their covariance (.., p, p) with all deviations as stated. If `apart`, each
+    exponent is compared with its own best velocity only.
     """
 
     def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
@@ -142,13 +142,14 @@ class _Grid:
 
     @property
     def least(self) -> float:
-        """The least squares over variances."""
+        """Return the smallest sum of squares over variances in the grid."""
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
         """Return a grid around the possible region with `left` degrees of freedom.
 
-        It extends beyond this grid where the region does; if no curve is possible it is this grid.
+        The new grid reaches beyond this one where the possible region does. If no curve is possible, this grid is
+        returned.
         """
         settings = ReadingSettings.current()
         grid = self
@@ -165,7 +166,7 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """Return how far each point is inside the limit of the possible region.
+        """Return the margin of each grid point to the cost limit of the possible region.
 
         `left` is the number of degrees of freedom.
         """
@@ -210,7 +211,7 @@ class _Grid:
         )
 
     def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
-        """Return the covariance of the curve's parameters, SI, by the slope at the best curve."""
+        """Return the covariance of the curve's parameters (SI), linearised at the best curve."""
         forces, speeds = self.forces, self.forces.speeds
         velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
         ratio = speeds / velocity

@@ -34,10 +34,10 @@ FrequencyRange = tuple[float, float]
 class Bench:
     """Results from the frequency responses of one bench.
 
-    `driven` and `other` are the responses of force to position of the driven mass and, if measured, of the other one;
-    lines, modes and two masses are those within `band` [Hz]; `departs`, `drag` and `explanation` describe the effect of
-    friction at the lower end. `aside` has, for every log, the relative errors with which the other logs' model predicts
-    its outputs. `warnings` give what was not found and why.
+    `driven` and `other` are the responses from force to position of the driven mass and, if measured, of the other
+    mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. `departs`, `drag` and `explanation`
+    describe the effect of friction at low frequency. `aside` has, for every log, the relative errors with which the
+    other logs' model predicts its outputs. `warnings` say what was not found, and why.
     """
 
     logs: tuple[Log, ...]
@@ -64,8 +64,8 @@ def analyse(
     """Analyse a frequency response, measured or estimated from logs of one experiment.
 
     `measured` is a response from another instrument. `band` [Hz] is the band of the models (default: above the effect
-    of friction); `period` [s] is about the period of the excitation (default: found). Raises InputError if no response
-    can be estimated.
+    of friction); `period` [s] is the approximate period of the excitation (default: searched). Raises InputError if no
+    response can be estimated.
     """
     settings = ResponseSettings.current()
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
@@ -106,14 +106,14 @@ def analyse(
 
 
 def _outputs(logs: Sequence[Log]) -> list[str]:
-    """List the outputs that all logs have: the driven mass, and the other one if measured."""
+    """List the outputs in all logs: the driven mass, and the other mass if measured."""
     if not logs:
         return []
     return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
-    """Convert a response from another instrument, with its accuracy by the scatter between lines."""
+    """Convert a response from another instrument; scatter between lines gives its accuracy."""
     output, _, unit = measured.unit.partition("/")
     unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
     return FrequencyResponse(
@@ -126,8 +126,8 @@ def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
     """Return the relative errors of the two-mass model in predicting another log's outputs.
 
-    They are taken over the band of the model. The log is excited every `period` [s]. Raises InputError if there is no
-    model.
+    The errors are taken over the band of the model. `period` [s] is the period of the log's excitation. Raises
+    InputError if there is no model.
     """
     if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
@@ -135,7 +135,7 @@ def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[floa
 
 
 def _attempt(warnings: list[str], label: str, function, *arguments):
-    """Return the result of an analysis; or None, with the reason added to the warnings."""
+    """Return the result of an analysis, or None after adding the reason to the warnings."""
     try:
         return function(*arguments)
     except InputError as error:
@@ -149,7 +149,7 @@ def _record(log: Log, output: str) -> ResponseRecord:
 
 
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
-    """Estimate a response by averaging over periods, or by the local polynomial method if nothing repeats.
+    """Estimate a response by averages over periods, or by local polynomials if nothing repeats.
 
     Channels are named as in the log.
     """
@@ -164,7 +164,7 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 
 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
-    """Keep the lines on which a response of either output stands out of the noise.
+    """Keep the lines on which the responses of both outputs stand out of the noise.
 
     Raises InputError where none does.
     """
@@ -174,9 +174,9 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
 
 def _below(model: TwoMass, band: FrequencyRange) -> bool:
-    """Tell whether a two-mass model has no antiresonance, or puts it below a band [Hz].
+    """Tell whether a two-mass model has no antiresonance, or has it below a band [Hz].
 
-    What the model leaves out, such as bristles, may stand for it there.
+    Below the band, an antiresonance may be an effect that the model leaves out, such as bristles.
     """
     return not model["antiresonance frequency"].value >= band[0]
 
@@ -188,7 +188,7 @@ def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRan
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """Return the last line, allowing for rounding errors."""
+    """Return the highest frequency [Hz] of the lines, raised by rounding errors."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -200,7 +200,7 @@ def _of_all(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to all realisations, with intervals at least as wide as the scatter of single ones."""
+    """Fit the two-mass model to all realisations, and widen intervals to their scatter."""
     apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
     return widened(fit_two_mass(driven, other, band), apart)
 
@@ -225,9 +225,9 @@ def _friction(
     model: TwoMass | None,
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
-    """Return the friction that explains the departure from the mass line, and the quality of that explanation.
+    """Return the friction that explains the departure from the mass line, and a test of it.
 
-    The second is the result of a simulation with that friction.
+    The test is a simulation with the estimated friction.
     """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
@@ -261,7 +261,7 @@ def _left_out(
     band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return for each log the errors of another log's model."""
+    """Return, for each log, the relative errors with which the other logs' model predicts it."""
     if len(logs) < 2:
         return ()
     rows = []
@@ -273,7 +273,7 @@ def _left_out(
 
 
 def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
-    """Return the relative errors of the driven output and, if asked, of the other one."""
+    """Return the relative prediction errors of the driven mass and, with `both`, of the other."""
     outputs = [("position", True), *([("cart_position", False)] if both else [])]
     return tuple(
         relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)

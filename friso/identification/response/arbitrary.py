@@ -1,7 +1,7 @@
 """Responses from arbitrary excitation: Welch's averages, and the local polynomial method.
 
-With a reference both are indirect, as in closed loop they have to be: the response of output and input to the
-reference, one over the other.
+With a reference, both methods are indirect, which a closed loop requires: the response is the ratio of the responses of
+output and input to the reference.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ OVERLAP = 1 / 36
 def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
     """Estimate a response and its coherence by overlapping Hann segments of 1/`resolution` [Hz].
 
-    It is H1 if the record has no reference. Its variance is that of the output not coherent with the external signal
-    (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is not included: a
-    mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
+    Without a reference the estimate is H1. Its variance is the power of the output that is not coherent with the
+    external signal (Bendat, Piersol, Random Data, 4th ed., ch. 9), divided by the effective number of segments. Leakage
+    is not included: a mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
     """
     record = record.checked()
     length = round(1 / (resolution * record.sample_time))
@@ -59,8 +59,8 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     """Estimate a response by the local polynomial method, free of leakage.
 
     The method is that of Pintelon, Schoukens, 2nd ed., ch. 7: about every line, response and transient are polynomials
-    of order 2 in the frequency over 17 lines of the spectrum of the whole record; what these leave over is the noise.
-    One line in 9 is given, so that neighbours share little. Raises InputError for a record of fewer than 200 samples.
+    of order 2 in the frequency over 17 lines of the spectrum of the whole record; the residual is the noise. One line
+    in 9 is returned, so that neighbours share little. Raises InputError for a record of fewer than 200 samples.
     """
     settings = ResponseSettings.current()
     record = record.checked(200)
@@ -110,7 +110,7 @@ def _response(
     coherence: np.ndarray | None,
     sample_time: float,
 ) -> FrequencyResponse:
-    """Make a response of an arbitrary excitation."""
+    """Make the frequency response to an arbitrary excitation, from its estimates on lines."""
     unknown = np.full(len(frequency), np.nan)
     warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(

@@ -19,12 +19,12 @@ from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import ResponseSettings
 
 DELAY, HELD, COMPLIANCES = range(3)
-"""Places of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from the
-last on, the compliance for each output."""
+"""Indices of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from
+`COMPLIANCES` on, the compliance for each output."""
 
 IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
-"""Numbers of the images that count, shape (images, 1): those left out are 0.00002 of the response of a mass at four
-samples per period."""
+"""Numbers k of the images that are summed, shape (images, 1). At four samples per period the others add 0.00002 of a
+mass's response."""
 
 MILLI = 1e-3
 
@@ -48,7 +48,7 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
     """Return lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,).
 
-    They are for a model of a response up to `top` [Hz].
+    The model covers frequencies up to `top` [Hz].
     """
     late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
@@ -58,7 +58,7 @@ def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.nd
 def believed(response: FrequencyResponse) -> tuple[float, float]:
     """Return value and deviation [ms^2] of the square of the time for which the force is held.
 
-    It may be held for none of the sample time, or for all of it.
+    The force may be held for none of the sample time up to all of it.
     """
     half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half

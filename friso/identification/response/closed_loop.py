@@ -18,11 +18,11 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     """Return signs that a controller feeds the output back to the input; () for none.
 
     Without a loop the output's past cannot help to predict the input beyond the input's own past (Granger 1969,
-    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). The periodic part of an input
-    is removed; one that repeats exactly contains no reaction. Slow or weak loops stay undetected.
+    doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). The periodic part of the input
+    is removed; an input that repeats exactly contains no reaction. Slow or weak loops stay undetected.
 
     The present sample of the output counts as past, because a position cannot react to a force within one sample;
-    `direct` says that this output can (an acceleration).
+    `direct` tells that this output reacts within a sample (an acceleration).
     """
     settings = ResponseSettings.current()
     record = record.checked(settings.samples_of_a_feedback_test)
@@ -56,10 +56,10 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
 
 
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
-    """Test whether the output's past helps to predict the input.
+    """Test whether the past of the output helps to predict the input.
 
-    Returns the probability of an F-test that it does not, and the fraction of the input's unpredicted part that it
-    explains.
+    Returns the probability (F-test) that the output's past does not help, and the fraction of the input's unpredicted
+    part that it explains.
     """
     settings = ResponseSettings.current()
     target = driven[settings.past_of_the_input :]
@@ -86,7 +86,7 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Return where a direct and an indirect estimate differ by more than their deviations, in words.
+    """Describe where a direct and an indirect estimate differ by more than their deviations.
 
     Both must have the same lines.
     """
@@ -113,9 +113,9 @@ def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> Freq
 def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
     """Return the frequencies [Hz] at which |L| passes 1, each with its interval, rising.
 
-    They are interpolated in logarithms; the interval follows from the interval of the magnitude and the slope over
-    nearby lines. Three passages (or five, ...) that noise does not tell apart count as one. Returns () if there is
-    none.
+    Crossovers are interpolated in logarithms; their intervals follow from the interval of the magnitude and the slope
+    over nearby lines. Three passages (or five, ...) that noise does not separate count as one. Returns () without a
+    crossover.
     """
     size, place = np.log(np.abs(loop.response)), np.log(loop.frequency)
     band = loop.band()
@@ -137,7 +137,7 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Merge passages into one: the centre of the middle one, and the range of them all."""
+    """Merge passages through 1 into one, with the middle one's centre and the range of all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 

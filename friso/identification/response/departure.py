@@ -16,17 +16,17 @@ from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
 
 RANDOM = np.sqrt(2 / np.pi)
-"""Damping by Coulomb friction F under a velocity of normal distribution with standard deviation v, over F/v (Gelb,
-Vander Velde 1968, table E.2: random-input describing function of the ideal relay)."""
+"""Equivalent damping of Coulomb friction F under a normally distributed velocity with standard deviation v, relative to
+F/v (Gelb, Vander Velde 1968, table E.2: random-input describing function of the ideal relay)."""
 
 
 @dataclass(frozen=True)
 class Departure:
     """Where a response leaves its linear model at low frequency.
 
-    Below `frequency` it differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz]. `differ` says
-    whether realisations differ there by more than noise (chance below 1 %), None where there is one only; `ratio` is
-    their scatter over the noise.
+    Below `frequency` the response differs from the model; `excess` (lines,) is |G/G_model| at `lines` [Hz]. `differ`
+    tells whether realisations differ there by more than noise (chance below 1 %), None with a single realisation;
+    `ratio` is their scatter relative to the noise.
     """
 
     frequency: Estimate
@@ -41,7 +41,7 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
     The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
     degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
-    the model is taken to hold as well as it can. The interval is the last window that is off. Raises InputError for
+    the model is taken to hold as well as it can. The interval is the highest window that departs. Raises InputError for
     fewer than 36 lines.
     """
     settings = ResponseSettings.current()
@@ -73,7 +73,7 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Tell whether distortion is more than noise on some lines, and return its ratio to it."""
+    """Tell whether distortion exceeds the noise on a part of the lines, and by which ratio."""
     settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
@@ -87,9 +87,9 @@ def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, floa
 class Drag:
     """Spring and damper that describe how friction acts on a rigid mass at low frequency.
 
-    `coulomb` is the friction level that damps as much at the velocity of this record (random, of standard deviation
-    `velocity`). `sign` is -1 if the output goes against the input. `left` is the fraction of the departure from the
-    mass line that they do not explain.
+    `coulomb` is the friction level that damps as much as the damper at the record's velocity (random, with standard
+    deviation `velocity`). `sign` is -1 if the output opposes the input. `left` is the fraction of the departure from
+    the mass line that spring and damper do not explain.
     """
 
     mass: Estimate

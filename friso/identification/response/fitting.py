@@ -14,7 +14,7 @@ from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.settings import ResponseSettings
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
-"""From parameters (p,) to complex responses (outputs, lines)."""
+"""A function from parameters (p,) to complex responses (outputs, lines)."""
 
 
 NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
@@ -34,12 +34,12 @@ class ResponseFit:
 
     @property
     def reduced(self) -> float:
-        """Sum of squares over degrees of freedom: 1 where model and deviations are right."""
+        """Return the sum of squares over degrees of freedom; 1 if model and deviations are right."""
         return self.squares / max(self.count - len(self.parameters), 1)
 
     @property
     def bic(self) -> float:
-        """Return the Bayesian information criterion, the variance's scale being unknown.
+        """Return the Bayesian information criterion for an unknown scale of the variance.
 
         Schwarz 1978, doi:10.1214/aos/1176344136.
         """
@@ -48,7 +48,7 @@ class ResponseFit:
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
         """Return a function of the parameters, and its deviation to first order.
 
-        It is NaN or infinite for undetermined parameters, beside whose value others overflow.
+        The value is NaN or infinite for undetermined parameters that overflow.
         """
         steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
         beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
@@ -62,7 +62,7 @@ class ResponseFit:
     ) -> Estimate:
         """Estimate a function of the parameters, with its interval to first order.
 
-        The interval of a `positive` quantity is one of its logarithm.
+        The interval of a `positive` quantity is computed for its logarithm.
         """
         settings = ResponseSettings.current()
         value, deviation = self._at(of)
@@ -81,7 +81,7 @@ class ResponseFit:
 
 
 def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
-    """Return a function of parameters; NaN if they are too large."""
+    """Evaluate a function of parameters; NaN if it overflows."""
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))
@@ -92,7 +92,7 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 def deviations(response: FrequencyResponse) -> np.ndarray:
     """Return the deviation of each line for weighting, at least a thousandth of the response.
 
-    No model is more accurate than that.
+    No model is more accurate than a thousandth.
     """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
@@ -110,9 +110,9 @@ def refined(
 
     Responses have the shape (outputs, lines). The errors of one line may be correlated between outputs, and those of
     neighbouring lines with each other, since a model is never quite right: the covariance is the larger of the plain
-    one, scaled by the residual, and a robust one (Newey, West 1987, doi:10.2307/1913610). `believed` holds values and
-    deviations of parameters by their place; each counts as one more observation. Limits only keep the fit from going
-    astray.
+    one, scaled by the residual, and a robust one (Newey, West 1987, doi:10.2307/1913610). `believed` holds prior values
+    and deviations of parameters by index; each counts as one more observation. `lower` and `upper` only keep the fit
+    from diverging.
     """
     settings = ResponseSettings.current()
     weight = np.sqrt(2) / deviation

@@ -22,8 +22,8 @@ from friso.identification.response.response import FrequencyResponse
 class Visible:
     """Features of a response of a stage on a cart.
 
-    It has straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the cart ("stuck",
-    "sliding", or "" if undecided), and all of it in words.
+    Fields are the straight lines by rising frequency, modes (None: too few lines, or no fit), the `case` of the cart
+    ("stuck", "sliding", or "" if undecided), and a description in words.
     """
 
     case: str
@@ -35,7 +35,7 @@ class Visible:
 def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
     """Find the lines and modes of a force-to-position response.
 
-    The `modes` are fitted unless given.
+    `modes` are fitted if None.
     """
     sign = _sign(response)
     lines = [line for slope in KINDS for line in straight_lines(response, slope, sign)]
@@ -55,7 +55,7 @@ def _sign(response: FrequencyResponse) -> float | None:
 
 
 def _resonances(modes: Modes | None) -> Mapping[str, float]:
-    """Return the frequencies [Hz] of resonances and antiresonances by name, by frequency."""
+    """Return the frequencies [Hz] of resonances and antiresonances by name, ascending."""
     if modes is None:
         return {}
     frequencies = {
@@ -69,8 +69,8 @@ def _resonances(modes: Modes | None) -> Mapping[str, float]:
 def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
     """Tell by the lowest line whether the cart sticks or slides.
 
-    A spring is a stuck cart, a mass or a damper a sliding one. A line above the first antiresonance, or the first
-    resonance if there is none, says nothing about the cart.
+    A stiffness line means a stuck cart, a mass or damping line a sliding cart. A line above the first antiresonance, or
+    the first resonance if there is none, says nothing about the cart.
     """
     kind = "antiresonance" if any(name.startswith("antiresonance") for name in pairs) else "resonance"
     first = min((value for name, value in pairs.items() if name.startswith(kind)), default=np.inf)

@@ -1,7 +1,7 @@
 """Find straight lines of a response: stiffness (slope 0), damping (slope -1) and mass lines (slope -2).
 
-A response from force to position follows 1/k, 1/(i omega d) or 1/((i omega)^2 m) there, so that its product with (i
-omega)^n is real, positive and constant over the band.
+On a straight line, a response from force to position follows 1/k, 1/(i omega d) or 1/((i omega)^2 m), so that its
+product with (i omega)^n is real, positive and constant.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from friso.identification.response.settings import ResponseSettings
 from friso.intervals import COVERAGE
 
 TURNED = np.radians(30)
-"""Largest phase deviation of a line of the band, beyond its noise (delay, damping, a mode nearby)."""
+"""Largest phase deviation [rad] on a straight line beyond the noise, by delay, damping or a mode nearby."""
 
 KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass line"}
-"""Names of the lines by minus their slope."""
+"""Names of straight lines, by their negative slope."""
 
 
 @dataclass(frozen=True)
 class StraightLine:
     """A straight line in a response, from `low` to `high` [Hz].
 
-    `kind` is a name of `KINDS`; `value` the stiffness, damping or mass; `level` its inverse: position, velocity or
-    acceleration per input. `sign` is -1 where the output goes against the input. `independent` is the effective number
-    of independent lines behind the interval.
+    `kind` is a name of `KINDS`; `value` is the stiffness, damping or mass, and `level` its inverse: position, velocity
+    or acceleration per input. `sign` is -1 if the output opposes the input. `independent` is the effective number of
+    independent spectral lines behind the interval.
     """
 
     kind: str
@@ -43,15 +43,14 @@ class StraightLine:
 
     @property
     def octaves(self) -> float:
-        """Width of the band in octaves."""
+        """Return the width of the band in octaves."""
         return float(np.log2(self.high / self.low))
 
 
 def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
     """Find the mass lines of a force-to-position response, at most `most`, by frequency.
 
-    Below an antiresonance it is the line of the whole mass, above the resonance the line of the driven part. Returns
-    () if there is none.
+    Below an antiresonance the whole mass makes the line, above the resonance the driven part. Returns () without any.
     """
     return straight_lines(response, 2, most=most)
 
@@ -61,8 +60,8 @@ def straight_lines(
 ) -> tuple[StraightLine, ...]:
     """Find bands in which a response falls with a `slope` of 0, 1 or 2.
 
-    The widest in octaves are searched first, and returned by frequency. `sign` is 1 or -1 if the direction of the input
-    is known (default: that of most of the band).
+    The widest bands in octaves are searched first; the result is sorted by frequency. `sign` is 1 or -1 if the
+    direction of the input is known (default: that of most of the band).
     """
     ordered = response.at((response.frequency > 0) & (np.abs(response.response) > 0))
     bands: list[tuple[int, int, float]] = []
@@ -80,7 +79,7 @@ def straight_lines(
 
 
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
-    """Tell whether the slope of a band can be distinguished from the next slopes."""
+    """Tell whether the slope of a band can be distinguished from neighbouring slopes."""
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
     weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
@@ -114,7 +113,7 @@ def _widest(
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
     """Return the widest band with acceptable chi-square and phase, between two lines.
 
-    Sums over all pairs of ends are compared.
+    All pairs of ends are tried.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
@@ -149,7 +148,7 @@ def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndar
 
 
 def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> StraightLine:
-    """Return the level of a band with its interval, and what it stands for."""
+    """Make the straight line of a band: its level, interval, and stiffness, damping or mass."""
     mean, half, independent = _level(response, slope, sign, band)
     low, high = float(response.frequency[band][0]), float(response.frequency[band][-1])
     method = f"{KINDS[slope]}, {low:.3g} to {high:.3g} Hz"
@@ -212,7 +211,7 @@ def _independent(residual: np.ndarray) -> float:
 
 
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
-    """Return the shapes in which a line may bend, (lines,), towards the nearer mode; both shapes without modes."""
+    """Return the shapes, (lines,), in which a straight line may bend towards the nearer mode."""
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
     gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]
@@ -224,9 +223,9 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
 
 
 def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a constant to levels, or a constant plus one of the `shapes` if an F-test (1 %) needs it.
+    """Fit a constant to levels, or a constant plus one of the `shapes` if significant.
 
-    Returns the columns of the fit (spectral lines, 1 or 2), and their coefficients.
+    An F-test at 1 % decides. Returns the columns of the fit (spectral lines, 1 or 2), and their coefficients.
     """
     ones = np.ones((len(level), 1))
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])

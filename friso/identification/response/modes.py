@@ -29,8 +29,8 @@ METHOD = "rational fit of the response"
 class Modes:
     """A fit of modes over `band` [Hz], with its resonances and antiresonances by frequency.
 
-    They are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen; `low_level` and
-    `high_level` are the acceleration per input below and above all modes (the mass lines), unknown without a rigid
+    Estimates are called "resonance 1 frequency" and so on. `order` says how the number of modes was chosen. `low_level`
+    and `high_level` are the acceleration per input below and above all modes (mass lines), unknown without a rigid
     body.
     """
 
@@ -49,7 +49,7 @@ class Modes:
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray) -> np.ndarray:
-        """Return the fitted response at frequencies [Hz], complex, of their shape."""
+        """Return the complex fitted response at frequencies [Hz], in their shape."""
         return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
 
 
@@ -81,7 +81,7 @@ def fit_modes(response: FrequencyResponse, band: tuple[float, float] | None = No
 
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
-    """Say how the order was chosen."""
+    """Write how the number of modes was chosen."""
     orders = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({orders})"
 
@@ -121,7 +121,7 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """Return a function of the parameters that gives the root nearest to a given one."""
+    """Return a function of the parameters that follows a pole or zero: the nearest to `root`."""
 
     def nearest(parameters: np.ndarray) -> complex:
         candidates = poles_and_zeros(parameters, shape)[which]
@@ -133,7 +133,7 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
     """Return the acceleration per input, below or above all modes.
 
-    Below, the rigid body moves alone; above, the residues of the modes are added.
+    Below all modes the rigid body alone counts; above, the residues of the modes are added.
     """
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"

@@ -14,16 +14,16 @@ from friso.identification.response.settings import ResponseSettings
 from friso.identification.response.two_mass import TwoMass
 
 MASS, DRAG, SPRING, BEYOND = range(4)
-"""Places of the parameters: logarithm of the mass, viscous friction, spring to ground; from the last on, those of
-`beyond`."""
+"""Indices of the parameters: logarithm of the mass, viscous friction, spring to ground; from `BEYOND` on, the
+parameters of module `beyond`."""
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
     """Tell whether two masses explain the responses much better than one mass does.
 
-    The one mass has viscous friction and a spring to ground; both models have equal delay and compliance, and cover the
-    band of the `model`. An F-test decides whether the difference is chance; its level is divided by the number of
-    lines, because the mode could lie at any of them.
+    The single mass has viscous friction and a spring to ground. Both models include delay and compliance, and cover the
+    band of `model`. An F-test decides whether the difference is chance; its level is divided by the number of lines,
+    because the mode could lie at any line.
     """
     settings = ResponseSettings.current()
     responses = [response for response in (driven, other) if response is not None]
@@ -39,8 +39,8 @@ def fit_one_mass(
 ) -> ResponseFit:
     """Fit one mass to the responses of one or two outputs on the same lines in a band [Hz].
 
-    Signs of -1 are reversed. It is the best of the fits from several corners of friction and spring inside and below
-    the band; parameters are as in the module.
+    Responses with sign -1 are reversed. Fits start from several corner frequencies of friction and spring inside and
+    below the band; the best is returned, with parameters as listed in this module.
     """
     held = {BEYOND + HELD: believed(responses[0])}
     outside = bounds(responses[0], band[1], len(responses))
@@ -62,7 +62,7 @@ def fit_one_mass(
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return the responses of one mass at every output, shape (outputs, lines), over [Hz]."""
+    """Return the response of one mass at every output, (outputs, lines), at frequencies [Hz]."""
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:
@@ -73,9 +73,9 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
-    """Return starting points for a fit, with different corners of friction and spring.
+    """Return starts of a fit, with different corner frequencies of friction and spring.
 
-    All have the magnitude of the first response.
+    All starts have the magnitude of the first response.
     """
     settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])

@@ -22,7 +22,7 @@ class Periods:
 
     @property
     def count(self) -> int:
-        """How many whole periods there are."""
+        """Return the number of whole periods."""
         return (self.stop - self.start) // self.samples
 
     def cut(self, signal: np.ndarray) -> np.ndarray:
@@ -31,9 +31,9 @@ class Periods:
 
 
 def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
-    """Find the whole periods of an input, shape (n,), counted back from where it ends.
+    """Find the whole periods of an input, shape (n,), counted backward from its end.
 
-    `expected` is about the number of samples in a period, which is then sought within 2 % of it. Raises InputError if
+    `expected` is the approximate number of samples in a period; the search covers 2 % about it. Raises InputError if
     the signal does not repeat, or has fewer than two periods.
     """
     stop = _switched_off(signal)
@@ -88,7 +88,7 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """Return the lags at which a signal repeats except for a slip of its clock."""
+    """Return the lags [samples] at which a signal repeats, except for a slip of its clock."""
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]
@@ -101,7 +101,7 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
-    """Go down from a lag to the next local minimum."""
+    """Return the local minimum of the change that is reached downhill from a lag."""
     while lag + 1 < len(change) and change[lag + 1] < change[lag]:
         lag += 1
     return lag
@@ -135,7 +135,7 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
 
 
 def _not_periodic(problem: str) -> InputError:
-    """The error for an input that does not repeat."""
+    """Build the error for an input that does not repeat."""
     return InputError(
         "period", problem, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times"
     )

@@ -23,8 +23,8 @@ def multisine(
 ) -> FrequencyResponse:
     """Estimate the response on excited lines from realisations of a periodic excitation.
 
-    A realisation is a record with its own phases. If it has a reference, the response is indirect: output over input,
-    each relative to the reference. `period` [s] is about the length of a period (default: found). The deviation covers
+    A realisation is a record with its own random phases. With a reference, the response is indirect: output over input,
+    each relative to the reference. `period` [s] is the approximate period (default: searched). The deviation covers
     noise and, with two realisations or with lines left free in the excitation, nonlinear distortion. Raises InputError
     for records that are not periodic or do not belong together.
     """
@@ -67,7 +67,7 @@ def multisine(
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     """Bring realisations to common lines, with remarks on their clocks.
 
-    Raises InputError if they have none in common.
+    Raises InputError without common lines.
     """
     settings = ResponseSettings.current()
     if not records:
@@ -110,7 +110,7 @@ def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return output and input relative to the external signal, each (realisations, lines).
 
-    They are averaged over periods.
+    Both are averaged over periods.
     """
     outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
@@ -118,7 +118,7 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deviation of the mean, and its degrees of freedom, over realisations."""
+    """Return the deviation of the mean over realisations, and its degrees of freedom."""
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)
@@ -135,7 +135,7 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
     """Return the nonlinear distortion (lines,), from the output at lines that are not excited.
 
-    Noise is subtracted, and so is the response to the input at these lines. NaN if no line in the band was left free.
+    Noise and the linear response to the input at these lines are subtracted. NaN if no line in the band was left free.
     """
     settings = ResponseSettings.current()
     places = np.flatnonzero(excited)

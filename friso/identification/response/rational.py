@@ -27,15 +27,15 @@ class RationalShape:
 
     @property
     def nonlinear(self) -> int:
-        """Count the parameters that enter nonlinearly; they come first.
+        """Return the number of nonlinear parameters, which come first.
 
-        They are viscous pole and delay, logarithms of frequencies, then logarithms of dampings.
+        Nonlinear parameters are viscous pole and delay, logarithms of frequencies, then logarithms of damping ratios.
         """
         return 2 + 2 * self.modes
 
     @property
     def words(self) -> str:
-        """The shape in words."""
+        """Describe the model's structure in words."""
         parts = [f"{self.modes} mode{'s' if self.modes != 1 else ''}"]
         parts += ["rigid body"] * self.rigid + ["constant"] * self.constant
         return " + ".join(parts)
@@ -51,7 +51,7 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Fit 0, 1, ... modes, as long as one more helps; the last model also with a constant."""
+    """Fit models with 0, 1, ... modes, as long as one more mode helps."""
     rows: list[Row] = []
     nonlinear = np.zeros(2)
     for modes in range(most + 1):
@@ -70,7 +70,7 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
 
 
 def simplest_model(rows: list[Row]) -> Row:
-    """Return the simplest model that no larger one beats clearly."""
+    """Return the simplest model that no larger model beats clearly."""
     ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
     best = ordered[0]
     for row in ordered[1:]:
@@ -89,7 +89,7 @@ def _better(larger: Row, smaller: Row) -> bool:
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return the factors of the linear parameters, complex, shape (linear, lines)."""
+    """Return the complex factors of the linear parameters, shape (linear, lines)."""
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
     parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
@@ -134,7 +134,7 @@ def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _another(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Return nonlinear parameters with one more mode, where it improves the fit most."""
+    """Add one more mode to the nonlinear parameters, where it improves the fit most."""
     settings = ResponseSettings.current()
     before = shape.modes - 1
     best, best_parameters = np.inf, nonlinear
@@ -165,7 +165,7 @@ def _eliminated(
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """Return the model with all its parameters, and its criterion."""
+    """Make the tried model, with linear parameters, criterion and sum of squares."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
@@ -175,7 +175,7 @@ def _completed(
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
     """Return the poles of the modes and the zeros of the response with positive imaginary part.
 
-    They are in units of the scale.
+    Both are relative to the scale of s.
     """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

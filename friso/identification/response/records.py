@@ -17,7 +17,7 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class ResponseRecord:
-    """Input, output and, in closed loop, the external reference (or injected force), each (n,).
+    """Input, output and, in closed loop, the external reference or injected force, (n,) each.
 
     Samples are `sample_time` [s] apart.
     """
@@ -33,7 +33,7 @@ class ResponseRecord:
         return self.input if self.reference is None else self.reference
 
     def checked(self, least: int = 8) -> ResponseRecord:
-        """Return the record as floats.
+        """Return the record as floats, after checking it.
 
         Raises InputError for NaN, unequal lengths, constant signals, too few samples.
         """
@@ -101,10 +101,11 @@ class Spectra:
 
 
 def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
-    """Return spectra of whole periods without transient, by the external signal.
+    """Compute the spectra of a record over whole periods, without the transient.
 
-    That is the reference if there is one, or the input. `period` [s] is the approximate length of a period. Drift from
-    period to period is removed first. Raises InputError if nothing repeats or fewer than two periods are left.
+    The external signal, the reference or else the input, gives the periods. `period` [s] is their approximate length.
+    Drift from period to period is removed first. Raises InputError if nothing repeats or fewer than two periods are
+    left.
     """
     record = record.checked()
     expected = None if period is None else period / record.sample_time
@@ -137,7 +138,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
-    """Yield sentences on periods that are left out."""
+    """Write sentences on periods that are left out."""
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
     if first:
@@ -145,7 +146,7 @@ def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
 
 
 def _slip(driving: np.ndarray, samples: int) -> float:
-    """Return by how many samples a period is longer than whole `samples`.
+    """Return by what fraction of a sample a period is longer than `samples`.
 
     The harmonics of the external signal, shape (periods, lines), turn from one period to the next, in proportion to
     their numbers.
@@ -157,7 +158,7 @@ def _slip(driving: np.ndarray, samples: int) -> float:
 
 
 def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
-    """Resample a record every `step` samples, by cubic splines, which attenuate all of its signals alike."""
+    """Resample a record every `step` samples by cubic splines, which treat all signals alike."""
     at = np.arange(int((len(record.input) - 1) / step) + 1) * step
 
     def taken(signal: np.ndarray) -> np.ndarray:
@@ -177,7 +178,7 @@ def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:
 def drift(signal: np.ndarray, samples: int) -> np.ndarray:
     """Average a signal, shape (n,), over a moving period, which removes the harmonics exactly.
 
-    At both ends, where no whole period fits, it is continued as a straight line.
+    At both ends, where no whole period fits, the average is continued as a straight line.
     """
     sums = np.concatenate([[0.0], np.cumsum(signal - signal.mean())])
     average = (sums[samples:] - sums[:-samples]) / samples + signal.mean()
@@ -190,7 +191,7 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
 
 
 def _same_excitation(driving: np.ndarray) -> np.ndarray:
-    """Tell which periods have the external signal of most periods."""
+    """Tell in which periods the external signal equals that of most periods."""
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
@@ -218,8 +219,8 @@ def _excited(driving: np.ndarray) -> np.ndarray:
 def _transient_periods(reaction: np.ndarray) -> int:
     """Count the leading periods that are transient, by the output (periods, lines).
 
-    At least three periods are kept. Each period is compared with the later half of the others. Without a transient the
-    first is the most distant one by chance only; the limit makes that rare.
+    At least three periods are kept. Each period is compared with the later half of the others. The limit on the
+    distance makes it rare that a period without a transient is dropped by chance.
     """
     count = len(reaction)
     last = max(3, count // 2)
@@ -248,7 +249,7 @@ def relative_error(
     """Return ||G U - Y|| / ||Y|| of a model on a periodic record that it was not fitted to.
 
     `model` gives complex responses G at frequencies [Hz]; U and Y are averaged over periods, on the excited lines in
-    `band` [Hz]. `period` [s] is about the length of a period (default: found). Raises InputError if the record is not
+    `band` [Hz]. `period` [s] is the approximate period (default: searched). Raises InputError if the record is not
     periodic or no line lies in the band.
     """
     measured = spectra(record, period)

@@ -27,7 +27,7 @@ class Channels:
 
 @dataclass(frozen=True)
 class ResponseBand:
-    """Limits at 95 % of magnitude [output per input unit] and phase [rad], shape (lines,)."""
+    """Limits of the 95 % intervals of magnitude [output per input unit] and phase [rad], (lines,)."""
 
     magnitude_low: np.ndarray
     magnitude_high: np.ndarray
@@ -39,13 +39,13 @@ class ResponseBand:
 class FrequencyResponse:
     """A response on the lines `frequency` [Hz]; all arrays have the shape (lines,).
 
-    `response` is complex [output unit per input unit]. `deviation` is its standard deviation, sqrt(E|error|^2), in
-    total; `noise` (differs from period to period) and `distortion` (differs from realisation to realisation) are its
-    parts, deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
+    `response` is complex [output unit per input unit]. `deviation` is its total standard deviation, sqrt(E|error|^2).
+    Its parts are `noise` (differs from period to period) and `distortion` (differs from realisation to realisation):
+    deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
 
-    `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is that of input and output, or
-    None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is that of the record, None if not
-    known.
+    `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is between input and output
+    (None: not known). `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is the record's (None:
+    not known).
     """
 
     frequency: np.ndarray
@@ -72,7 +72,7 @@ class FrequencyResponse:
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
-        """Return the response as data of python-control, over rad/s, with a line at 0 Hz if any."""
+        """Convert the response to python-control's data, over rad/s, with a line at 0 Hz if any."""
         from control import FrequencyResponseData
 
         omega = 2 * np.pi * self.frequency
@@ -151,5 +151,5 @@ class FrequencyResponse:
         width = min(ResponseSettings.current().lines_of_a_scatter, len(second))
         medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
         places = np.arange(len(size)) - 1 - (width - 1) / 2
-        rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # normal distribution: median to deviation
+        rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # of normal deviations
         return np.maximum(self.deviation, np.sqrt(2) * rough * size)

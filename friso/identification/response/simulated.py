@@ -19,9 +19,9 @@ from friso.identification.response.settings import ResponseSettings
 class Explanation:
     """A simulation of friction, and its residual against the departure of a measured response.
 
-    `responses` are simulated, by the factor on the recorded input. `left` is the fraction of the departure from the
-    mass line, in units of the deviations, that the simulation with the recorded input leaves; 0 explains all of it, 1
-    nothing.
+    `responses` are simulated responses by the factor on the recorded input. `left` is the fraction of the departure
+    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain: 0
+    means a full explanation, 1 none.
     """
 
     responses: Mapping[float, FrequencyResponse]
@@ -36,7 +36,7 @@ def explained(
     limits: tuple[float, float],
     factors: Sequence[float] = (0.5, 1.0, 2.0),
 ) -> Explanation:
-    """Simulate the mass, spring and Coulomb friction of `drag` under each realisation's input.
+    """Simulate mass, spring and Coulomb friction of `drag` under each realisation's input.
 
     One period of each input is simulated, shape (n,). The result is compared with the `measured` response between
     `limits` [Hz]. The `factors`, of which 1 must be one, show how the response depends on the amplitude. Raises
@@ -67,9 +67,9 @@ def slid(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Simulate a mass [kg] on a spring [N/m] with Coulomb friction [N] under forces [N].
 
-    Returns position [m] and velocity [m/s], each of shape (lanes, n) as the forces, from rest. Time stepping treats
-    sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the step.
-    The error is of first order in the sample time.
+    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (lanes, n). Time stepping
+    treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the
+    step. The error is of first order in the sample time.
     """
     position, velocity = np.zeros(len(force)), np.zeros(len(force))
     positions, velocities = np.empty_like(force), np.empty_like(force)
@@ -83,7 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the fraction of the departure from the mass line that the simulation does not explain."""
+    """Return the fraction of the departure from the mass line that a simulation leaves."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

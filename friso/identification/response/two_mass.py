@@ -1,4 +1,4 @@
-"""Fit two masses and a joint to responses at the driven mass and, if measured, at the other one."""
+"""Fit two masses and a joint to responses at the driven mass and, if measured, at the other mass."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from friso.intervals import COVERAGE
 METHOD = "two-mass model fitted to the response"
 
 FAR = np.log(30.0)
-"""Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
+"""Logarithm of the factor by which masses and stiffness may differ from the start; damping may by twice as much."""
 
 DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
-"""Places of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; from the
-last on, those of `beyond`."""
+"""Indices of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; from
+`BEYOND` on, the parameters of module `beyond`."""
 
 
 @dataclass(frozen=True)
 class TwoMass:
     """A driven mass, a joint and another mass, as fitted to a response.
 
-    A mass has the unit of input per acceleration. `fit` holds the parameters (see the module); `signs` of the two
-    outputs are -1 if they go against the input. `estimates` hold masses, stiffness, damping, viscous friction, delay,
+    The unit of masses is input per acceleration. `fit` has the parameters at the module's indices; `signs` of the two
+    outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping, viscous friction, delay,
     antiresonance and resonance.
     """
 
@@ -47,7 +47,7 @@ class TwoMass:
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
-        """Return the complex response of the driven mass, or of the other, at frequencies [Hz]."""
+        """Return the complex response of the driven mass, or of the other mass, at frequencies [Hz]."""
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
 
@@ -55,8 +55,8 @@ class TwoMass:
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     """Return the responses of two masses to a force on the driven one, over frequencies [Hz].
 
-    Shape (outputs, lines): one output is the driven mass; a second one, for which `parameters` then have a further
-    compliance, is the other mass.
+    The result has the shape (outputs, lines): the driven mass and, if `parameters` has a second compliance, the other
+    mass.
     """
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     outputs = len(parameters) - BEYOND - COMPLIANCES
@@ -106,10 +106,10 @@ def fit_two_mass(
 
 
 def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
-    """Widen estimates by how far fits of single realisations, `apart`, lie from each other.
+    """Widen estimates to the scatter of the fits of single realisations, `apart`.
 
-    Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
-    which one response cannot show: the intervals are scaled up by the Birge ratio (Birge 1932,
+    If single fits scatter more than their intervals allow, friction moves the parameters from realisation to
+    realisation, which one response cannot show. Intervals are then scaled up by the Birge ratio (Birge 1932,
     doi:10.1103/PhysRev.40.207). Raises InputError for fewer than two.
     """
     if len(apart) < 2:
@@ -121,7 +121,7 @@ def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     """Widen the interval of an estimate if the others scatter by more than their intervals say.
 
-    The factor is the ratio of external to internal scatter of the others, if above 1.
+    The factor is the Birge ratio, external over internal scatter of the others, if above 1.
     """
     if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
@@ -158,7 +158,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
     """Return a start from the first antiresonance and resonance of a rational fit.
 
-    The whole mass is 1. Returns [] if it has none.
+    The total mass is 1. Returns [] without both.
     """
     try:
         modes = fit_modes(response)
@@ -175,7 +175,7 @@ def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
 
 
 def _start(other: float, stiffness: float, damping: float, outputs: int) -> np.ndarray:
-    """Return parameters of a start."""
+    """Return the parameters of a start with a total mass of 1, in logarithms."""
     return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(BEYOND - DRAG + COMPLIANCES + outputs)])
 
 
@@ -218,9 +218,9 @@ def _best(
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield starts with the resonance where the first acceleration is highest within the band.
+    """Yield starts with the resonance at the highest acceleration of the driven mass.
 
-    They have several mass ratios.
+    The starts have several mass ratios.
     """
     settings = ResponseSettings.current()
     level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
@@ -249,7 +249,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
 
 
 def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Return masses and joint, with derived quantities."""
+    """Convert a fit to estimates of masses and joint, and of derived quantities."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"
 
@@ -286,5 +286,5 @@ def _root(parameters: np.ndarray, zero: bool) -> complex:
 
 
 def _si(unit: str) -> str:
-    """Return the usual names of units where input is in newtons and output in metres."""
+    """Shorten units to kg, N/m and the like where input is in newtons and output in metres."""
     return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

@@ -33,12 +33,13 @@ from friso.shown.drawing.prefixes import pretty, with_unit
 from friso.stage.transmission import moving_mass
 
 QUARTER = 90.0
-"""Step of phase axes [deg]: a quarter of a turn."""
+"""Distance of ticks on phase axes [deg]: a quarter of a turn."""
 
 STARTS = -315.0
 """Lower end [deg] of the turn in which the first phase is plotted.
 
-It lies between the phases of whole numbers of integrations."""
+The end lies between the phases of whole numbers of integrations.
+"""
 
 LEAST_PHASE = -720.0
 """Lower end of phase axes [deg]; the delay at high frequencies would extend them without end."""
@@ -148,7 +149,7 @@ def _cascade(bode: Bode) -> Iterator[Figure]:
     """
     if not bode.cascades:
         return
-    from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # whose phase begins at 0
+    from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # its phase begins at 0
     moved = [_curve(name, bode.cascades[name].plant) for name in from_sliding]
     sizes = np.concatenate([np.abs(curve.response) for curve in moved])
     axis = Axis("Magnitude", "m/(N*s)", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)

@@ -25,8 +25,8 @@ _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
 class ShownState:
     """A state with its margins, label and colour.
 
-    `where` says which state it is, if the label does not. `loops` holds the margins of each loop of a cascade in a
-    limit case.
+    `where` describes the state if the label does not. `loops` has the margins of each loop of a cascade in a limit
+    case.
     """
 
     label: str
@@ -87,9 +87,9 @@ def in_words(cart: str, touched: bool, limited: bool) -> str:
 
 
 def cart(member: Members, bode: Bode) -> str:
-    """Say what the cart does: stuck, under a bias force, or sliding at a speed; empty without friction.
+    """Say what the cart does: it sticks, or slides at a speed; empty without friction.
 
-    The highest speed stands for sliding fast, where friction no longer falls. No motion need reach that.
+    The highest speed stands for fast sliding, where friction no longer falls. No motion need reach this speed.
     """
     if not has_friction(bode):
         return ""
@@ -108,7 +108,7 @@ def side(touched: bool) -> str:
 def has_limiter(bode: Bode) -> bool:
     """Tell whether the limiter can be both free and touched.
 
-    It cannot where the joint is locked or has no stroke.
+    It can be only one of both if the joint is locked or has no stroke.
     """
     return bool(np.ptp(bode.scan.members.touched.astype(int)))
 

@@ -20,7 +20,7 @@ OF_LOOPS = ("Stable", "0 dB crossings", "Phase margin", "Gain margin", "Modulus 
 """Names of the rows of each loop of a cascade."""
 
 ANY = "no limit"
-"""Text where nothing brings a loop to the edge of its stability."""
+"""Text of a margin that is unlimited, because nothing brings the loop to the edge of stability."""
 
 
 def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
@@ -36,7 +36,7 @@ def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
 
 
 def _of_loop(item: ShownState, loop: CascadeLoop, name: str) -> str:
-    """Return one entry for a loop of a cascade."""
+    """Write the entry of the row `name` for one loop of a cascade."""
     return _ROWS[name](item.loops[loop]) if loop in item.loops else NOTHING
 
 

@@ -40,9 +40,9 @@ def sentences(bode: Bode) -> list[str]:
 
 
 def stability(bode: Bode) -> list[str]:
-    """Say whether the controller is stable in the settled states, and with which margin.
+    """Say whether the loop is stable in the settled states, and with which margin.
 
-    Then say whether it is stable in all other states, and why not.
+    Further sentences say whether the loop is stable in all other states, and why not.
     """
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]
@@ -82,7 +82,7 @@ def crossover_heading(bode: Bode) -> str:
 
 
 def crossovers(bode: Bode) -> dict[str, str]:
-    """Say by state of the joint at which crossovers the loop is stable, and with a good margin.
+    """Say, for each state of the joint, at which crossovers the loop is stable and robust.
 
     A controller given by gains has bandwidths in place of crossovers.
     """
@@ -132,7 +132,7 @@ def _subject(bode: Bode) -> str:
 
 
 def _unit(bode: Bode) -> str:
-    """Return the unit of the bandwidth: hertz, or multiples of the present one."""
+    """Return the unit of the bandwidth: hertz, or multiples of the present bandwidth."""
     return "Hz" if _crossing(bode) else "times this bandwidth"
 
 

@@ -58,7 +58,7 @@ NODES = {
 }
 
 LOST = "a change, no curve begun"
-"""Label of places between differing stages where no curve could be started."""
+"""Label of marks between stages with different verdicts where no curve could be started."""
 
 LOST_END = "cycle not followed farther"
 """Label of ends of curves inside the range."""
@@ -67,13 +67,13 @@ MEETING = "curves meet"
 """Label of places where two curves cross, end on each other, or begin or cease to coincide."""
 
 REACH = 2.5
-"""Largest multiplier that is shown."""
+"""Largest Floquet multiplier that is shown."""
 
 LOGARITHMIC = 30.0
 """Ratio of the largest to the smallest amplitude above which the axis is logarithmic."""
 
 MARGIN = 0.02
-"""Margin of the plane of two keys, as a fraction of a range; nodes at its sides are then fully visible."""
+"""Margin around the plane of two keys, as a fraction of the range, so that nodes at its sides are fully visible."""
 
 
 def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
@@ -126,9 +126,9 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
 
 
 def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
-    """Yield the parts of a branch between changes of stability.
+    """Yield the parts of a branch between changes of stability, for drawing.
 
-    Each part comes with whether its cycles attract, and with the numbers of its points.
+    Each part is a pair: whether its cycles attract, and the indices of its points.
     """
     changes = np.flatnonzero(np.diff(line.attracts)) + 1
     for legs in np.split(np.arange(line.attracts.size), changes):

@@ -60,7 +60,7 @@ PLAIN = 1e-5
 
 @dataclass(frozen=True)
 class ShownKey:
-    """A key and the unit in which its values are printed; `factor` is that unit in SI."""
+    """A key and the unit in which its values are printed; `factor` is the SI value of the unit."""
 
     key: str
     unit: str = ""
@@ -113,7 +113,7 @@ def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     """Say where hunting is possible and where it ends.
 
-    First of all, say where the loop is unstable even without friction.
+    The first sentence says where the loop is unstable even without friction.
     """
     return " ".join([*_unstable(traced, keys), _where(traced, keys)])
 

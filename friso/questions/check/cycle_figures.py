@@ -14,10 +14,10 @@ from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figur
 if TYPE_CHECKING:
     from friso.hunting import Cycle, Hunting
 
-_VIEW = 2.2  # reach of a return map's axes, in units of the largest cycle, or swing followed by one as large
-_STARTS, _FOLLOWED = 401, 300  # distances that are followed by a return map, and for how many swings
+_VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle or repeated swing
+_STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed
 _BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
-_APART = 0.01  # share of the amplitude from which on the cart is seen to move otherwise than the stage
+_APART = 0.01  # smallest difference of cart and stage that is drawn, relative to the amplitude
 _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
 

@@ -61,7 +61,7 @@ def _isolator(isolator: Suggestion) -> dict[str, Any]:
 
 
 def _feeding(feeding: Feeding) -> dict[str, Any]:
-    """Return the fractions of friction and of backlash down to which hunting lasts."""
+    """Return the fractions of friction and backlash down to which hunting persists."""
     parts = {"friction": feeding.friction, "backlash": feeding.backlash}
     return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 
@@ -158,7 +158,7 @@ def _margin(edge: Margin) -> dict[str, Any]:
 
 
 def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
-    """Return one end of the bandwidths at which something attracts."""
+    """Return one end of the bandwidths at which hunting attracts."""
     if end is None:
         return None
     return {
@@ -172,7 +172,7 @@ def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
 def _parameter_margin(margin: ParameterMargin) -> dict[str, Any]:
     """Return the multiples of a parameter at which hunting begins or ends.
 
-    Each end gives the last multiple with the same verdict and the next one with another verdict.
+    Each end has the last multiple with an unchanged verdict and the next multiple with another verdict.
     """
 
     def end(one: MarginEnd | None) -> dict[str, Any] | None:

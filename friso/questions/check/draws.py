@@ -57,7 +57,7 @@ def draws_sentences(draws: Draws) -> list[str]:
 
 
 def _swings(fates: Fates) -> str:
-    """Say how far and how slowly the draws hunt, from the least to the most; "" where none does."""
+    """Write the ranges of amplitude and period with which draws hunt; "" if none does."""
     amplitudes, periods = (values[np.isfinite(values)] for values in (fates.amplitudes, fates.periods))
     if not amplitudes.size:
         return ""
@@ -69,7 +69,7 @@ def _swings(fates: Fates) -> str:
 
 
 def _edge(draws: Draws) -> str:
-    """Say between which bandwidths the edge of hunting of the draws lies; "" where it is not known."""
+    """Write between which bandwidths the draws' edges of hunting lie; "" if not known."""
     drawn_edges = draws.edges
     if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
         return ""
@@ -82,7 +82,7 @@ def _edge(draws: Draws) -> str:
 def _narrowed(draws: Draws) -> str:
     """Say which measurement would narrow the ranges most; "" where it is not known.
 
-    It is that of the key that amplitudes follow most closely.
+    The measurement is of the key with which amplitudes correlate most.
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))
@@ -148,5 +148,5 @@ def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
             below = below + counts
     limits = (0.0, 1.05 * float(below.max()))
     x_axis = Axis(key, draws.unit(key), (float(edges[0]), float(edges[-1])))
-    title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # one band alone has no legend
+    title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # a single band has no legend
     return Panel(title, x_axis, Axis("Draws", "", limits), bands=tuple(bands))

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 SHARES = {"force_p": ("P", SKY), "force_i": ("I", ORANGE), "force_d": ("D", PINK)}
 
 _FLOOR = 1e-9  # [m] lower end of the logarithmic settling panel: below any sensor of such a stage
-_PERIODS = 4  # hunting periods shown of the force shares
+_PERIODS = 4  # number of hunting periods that the figure of force terms shows
 
 
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
@@ -80,9 +80,9 @@ def response_figure(trace: xr.Dataset) -> Figure:
 
 
 def _at_stand(trace: xr.Dataset) -> np.ndarray:
-    """Tell which samples show how a run behaves where its reference stands, shape (n,): the later half of each stand.
+    """Mark the later half of each standstill of the reference, shape (n,).
 
-    Stands shorter than a tenth of the run are left out. Where no other is left it is the later half of the run.
+    Standstills shorter than a tenth of the run are left out. Without any, the later half of the run is marked.
     """
     reference = samples(trace, "reference")
     count = len(reference)
@@ -276,7 +276,7 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
 def _window(cases: list[ShownCase]) -> tuple[float, float]:
     """Return begin and end [s] of the settled part of the runs.
 
-    It begins where peaks are counted, or half-way through a shorter run.
+    The settled part begins where peaks are counted, or half-way through a shorter run.
     """
     end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
 SAME = 1e-3
-"""Relative difference of edges below which they are stated as one."""
+"""Relative difference of edges below which only one edge is stated."""
 
 COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 

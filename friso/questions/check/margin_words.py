@@ -60,9 +60,9 @@ def margin_ways(margin: ParameterMargin) -> list[str]:
 
 
 def thin_margins(case: Case) -> list[str]:
-    """Return what brings hunting back in a case that settles, if its reserve is small.
+    """List small margins of a case that settles: what little change brings hunting back.
 
-    Small means less than the distance from an edge that advice keeps.
+    A margin is small if it is less than the distance from the edge that advice keeps.
     """
     distance, thin = SEARCH_LIMITS.edge_distance, []
     edge, friction = case.judgement.margin, case.static_friction
@@ -81,8 +81,8 @@ def _side(side: int) -> str:
 
 
 def _way(side: int, end: MarginEnd) -> str:
-    """Say between which multiples of a parameter hunting begins or ends; their digits are rounded apart."""
-    if end.same == 1:  # how little it takes is not known
+    """Say between which multiples of a parameter hunting begins or ends."""
+    if end.same == 1:  # how little change is enough is not known
         return f"at {plain_factor(end.other)} times yours or {'less' if side > 0 else 'more'}"
     low, high = sorted((end.same, end.other))
     return f"between {plain_factor(rounded_down(low))} and {plain_factor(rounded_up(high))} times yours"
@@ -91,7 +91,7 @@ def _way(side: int, end: MarginEnd) -> str:
 def _gap(case: Case, margin: ParameterMargin) -> str:
     """Write the gap between static and Coulomb friction [N] at the nearest end.
 
-    It is empty for a stage with several friction laws, or with no single end.
+    The text is empty for a stage with several friction laws, or without a single end.
     """
     flat = case.stage.flat()
     pairs = static_frictions(flat)

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with which the loop is unstable"
-"""Reason why a verdict is not certain whose loop only the drive makes unstable."""
+"""Reason given for an uncertain verdict on a loop that only the drive makes unstable."""
 
 
 class CheckAnswer(Answer):
@@ -125,7 +125,7 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """Return what the search for the edge may miss, the joint's margins, and doubts on passivity."""
+        """Say what the search for the edge may miss; add the joint's margins and passivity doubts."""
         from friso.questions.check.margin_words import joint_sentences
         from friso.questions.check.words import between_surveyed
         from friso.questions.convert.words import activity_sentences
@@ -259,7 +259,7 @@ def checked_stage(
     if sample is not None:
         from friso.studies.draws import Draws
 
-        answers_interrupts()  # from here on, there is an answer
+        answers_interrupts()  # from here on, an interruption still leaves an answer
         try:
             drawn = Draws.of(chosen, sample, seed, loose, cases["given"].judgement.margin, progress)
             cut = drawn.asked > drawn.sample.count

@@ -25,7 +25,7 @@ from friso.shown.drawing.prefixes import (
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Kick, Tracking
 
-_WINDOWS = 4  # windows of kicks that are listed, at most
+_WINDOWS = 4  # largest number of listed windows of kicks
 UNKNOWN = "not determined: that takes more work than a check may"
 
 
@@ -46,7 +46,7 @@ def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
-    """Turn a text about a cycle into a text about a case, empty for a case without a cycle."""
+    """Turn a function that describes a cycle into one that describes a case's cycle."""
 
     def of_the_case(case: Case) -> str:
         """Write the text about the cycle of a case, or that there is none."""

@@ -55,13 +55,13 @@ IN_SHORT: Mapping[Verdict, str] = {
 """Words for the verdict on a case before its margin is known."""
 
 ONE_PLACE = 1.01
-"""Ratio of the ends of a window below which it is stated by its centre and width."""
+"""Ratio of the ends of a window of bandwidths below which its centre and width are stated instead."""
 
 ROUGH = 5e-4
-"""Relative reserve of an edge from which it is mentioned, because the digits shown are then not certain."""
+"""Relative uncertainty of an edge above which it is mentioned, because the shown digits are not certain."""
 
 ROUGHER = 10 * ROUGH
-"""Relative reserve of an edge from which one digit less is shown."""
+"""Relative uncertainty of an edge above which one digit less is shown."""
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
@@ -88,7 +88,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """State where the loop is unstable even without friction, and where the drive makes it unstable."""
+    """Say where the loop is unstable, even without friction or by the drive alone."""
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -148,7 +148,7 @@ def _hunting(case: Case) -> str:
 def _bistable(case: Case) -> str:
     """Describe a case that settles after this move but hunts after others.
 
-    The sentence names the smallest kicks and the fraction of moves that start hunting.
+    The sentences name the smallest kicks, and the fraction of moves, that start hunting.
     """
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
@@ -334,7 +334,7 @@ def _unsearched(case: Case) -> list[str]:
 def edge_text(case: Case, end: AttractionEnd) -> str:
     """Write a bandwidth at which hunting ends.
 
-    An uncertain edge is given by where hunting was found and where it was not.
+    For an uncertain edge, the text states where hunting was found and where not.
     """
     if not end.certain:
         ends = sorted((end.inside, end.outside))
@@ -375,7 +375,7 @@ def _elsewhere(case: Case) -> str | None:
 
 
 def _windows(case: Case) -> list[str]:
-    """Say where else in bandwidth something attracts."""
+    """Say at which other bandwidths hunting attracts."""
     places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
@@ -498,7 +498,7 @@ def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
 def _swing(case: Case) -> str:
     """Write the size and period of the hunting cycle, such as "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
-    assert swing  # it attracts, or the verdict were another
+    assert swing  # the verdict implies an attracting cycle
     size, turns = plus_minus(swing.amplitude, "m"), swing.swings / 2
     often = f"{size} every {with_unit(swing.period / turns, 's')}"
     if turns == 1:

@@ -27,7 +27,7 @@ from friso.studies.compare.study import LONGER, Comparison, OptionResult
 
 _NAMES = ("ink", "blue", "vermillion", "orange", "pink", "sky", "green")
 COLOURS: dict[str, str] = dict(zip(_NAMES, (INK, BLUE, VERMILLION, ORANGE, PINK, SKY, GREEN), strict=True))
-"""Colours of options, by their names for colours."""
+"""Colours of options, by the colour name that an option declares."""
 
 BESIDE = 0.16
 """Distance between the markers of one option, relative to the distance between options."""
@@ -121,7 +121,7 @@ def _standstill(comparison: Comparison) -> Panel:
         _bars(x, most, GREY),
         _bars(x, [(median.low, median.high) for median in medians], BLUE, width=4.0),
     )
-    moves = max((high for _, high in most if high > 0), default=0.0) > 0  # none does that rests where it begins
+    moves = max((high for _, high in most if high > 0), default=0.0) > 0  # none rests from the start
     y = Axis("In-position RMS", "m", log=moves)
     title = "Standstill" if comparison.shaken else "At rest or not (no floor vibration)"
     return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))

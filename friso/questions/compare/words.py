@@ -189,7 +189,7 @@ def answer(comparison: Comparison) -> list[str]:
 
 
 def _interrupted(comparison: Comparison) -> list[str]:
-    """Say which options an interruption left, so that nothing is concluded of them."""
+    """Say which options were not run because of an interruption."""
     if not comparison.not_run:
         return []
     letters = listed([option.letter for option in comparison.not_run], "and")
@@ -197,7 +197,7 @@ def _interrupted(comparison: Comparison) -> list[str]:
 
 
 def _turning(comparison: Comparison) -> list[str]:
-    """Say at which limit of the bandwidth the conclusion changes; below it, the controller alone is not enough."""
+    """Say from which bandwidth on a faster controller alone brings the machines to rest."""
     needed, base = comparison.needed, comparison.results[0]
     if needed is None or base.rests:
         return []
@@ -259,7 +259,7 @@ def conclusion(comparison: Comparison) -> str:
 
 
 def _too_late(resting: Sequence[OptionResult]) -> str:
-    """Say with which options, of those that bring machines to rest, half of them miss a place of their motion."""
+    """Say with which options half of the machines miss the far end of their motion in time."""
     late = [result for result in resting if not np.isfinite(result.settling.value)]
     if not late:
         return ""

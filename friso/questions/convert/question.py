@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from friso.shown.files import Files
 
 MOST = 12
-"""Elements at most."""
+"""Largest number of elements of a law with several elements."""
 
 
 class ConvertAnswer(Answer):

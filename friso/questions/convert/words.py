@@ -1,6 +1,6 @@
 """Describe a conversion to another friction law in words.
 
-It is said what is kept, what is not, and what the measurements leave open.
+The sentences say what is kept, what is not, and what measurements leave open.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def activity_sentences(condition: str) -> list[str]:
 
 
 def quantity_name(item: MeasuredChange) -> str:
-    """Name a measured quantity, a loop with its amplitude."""
+    """Name a measured quantity; a hysteresis loop is named with its amplitude."""
     amplitude = "" if item.amplitude is None else f" of ±{with_unit(item.amplitude, 'm')}"
     return f"{SHOWN[item.kind]}{amplitude}"
 

@@ -20,7 +20,7 @@ from friso.questions.design.words import (
 from friso.shown.drawing.prefixes import listed
 
 ROUNDED = 0.01
-"""Relative distance below its bound at which a crossover is not mentioned; crossovers have three digits."""
+"""Relative distance of a crossover from its bound that is rounding, since crossovers have three digits."""
 
 LITTLE = 0.1
 """Least relative gain of modulus margin for which more joint damping is recommended."""

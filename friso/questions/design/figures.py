@@ -39,12 +39,13 @@ from friso.shown.drawing.figure import (
 from friso.shown.drawing.prefixes import listed
 
 CHOSEN = "#e3001b"
-"""Colour of the chosen design's marker, as of an evaluation point in maps."""
+"""Colour of the chosen design's marker, equal to the evaluation point's colour in maps."""
 
 WIDE, FEW = 30.0, 0.01
 """Conditions for a logarithmic axis of settling times.
 
-It is used if the longest time exceeds `WIDE` times the quantile `FEW`."""
+The axis is logarithmic if the longest time exceeds `WIDE` times the quantile `FEW`.
+"""
 
 SHARES = 401
 """Number of points of a distribution."""

@@ -1,6 +1,7 @@
 """Describe the leaf springs of a design in words.
 
-These are their numbers, the requirements that limit them, and how the beam model confirms the closed forms.
+The words cover their numbers, the requirements that limit them, and how closely the beam model confirms the closed
+forms.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
 
 
 def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
-    """Join a text for each key that relaxes a requirement."""
+    """Describe each key whose change relaxes a requirement by `text`, and join the descriptions."""
     return ", ".join(map(text, requirement.keys))
 
 

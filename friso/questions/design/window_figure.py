@@ -1,4 +1,4 @@
-"""Draw the window for the crossover: where the machine hunts, and what allows how much."""
+"""Draw the window of the crossover: where the machine hunts, and what bounds the crossover."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ SHOWN = 5
 class DesignStep:
     """A step of the method, with its result as title.
 
-    It has the reasons in sentences, its numbers by name, and the names of its figures.
+    Fields are the reasons in sentences, the numbers by name, and the names of the step's figures.
     """
 
     title: str

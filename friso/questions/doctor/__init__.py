@@ -1,4 +1,4 @@
-"""Does friso work on this machine."""
+"""Check whether friso works on this computer."""
 
 from friso.interface.question import HELP, Question
 

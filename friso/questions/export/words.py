@@ -17,7 +17,7 @@ def title(gains: Gains) -> str:
 
 
 def sentences(gains: Gains) -> list[str]:
-    """Write the gains as they are typed into a drive, and what to know of them."""
+    """Write the gains to type into a drive, and remarks on the numbers."""
     typed = [f"{row.symbol} = {_with_unit(row.values[min(1, len(row.values) - 1)])}" for row in gains.conversions]
     return [f"{title(gains)}, in units of drives: {', '.join(typed)}.", *(f"{note}." for note in notes(gains))]
 
@@ -31,7 +31,7 @@ def rows(gains: Gains) -> list[tuple[str, list[str]]]:
 
 
 def notes(gains: Gains) -> list[str]:
-    """Return what to know of the numbers: missing units, formulas used, and keys left out."""
+    """Write remarks on the numbers: missing units, formulas used, and keys left out."""
     texts = []
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')

@@ -1,4 +1,4 @@
-"""What the leaf springs of a joint are worth."""
+"""How good the leaf springs of a joint are: stiffness, modes, stress."""
 
 from friso.interface.question import STOPS, Question
 

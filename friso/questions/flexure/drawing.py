@@ -218,7 +218,7 @@ def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
 
 
 def _legend(drawing: PaperDrawing) -> list[str]:
-    """Return what the letters mean, and what is not to scale."""
+    """Return the legend: the meaning of the letters, and parts that are not to scale."""
     names = {"A": "actuation along z", "S": "sensor", "C": "centre of mass"}
     texts = [
         f"{k} {names[k]} ({', '.join(_mm(coordinate) for coordinate in point)})" for k, point in drawing.points.items()

@@ -25,7 +25,7 @@ LEAST_LEAF, LEAST_STROKE = 0.5, 1.6
 """Least drawn thickness of a leaf, and least drawn stroke [mm]."""
 
 BEYOND = 10.0
-"""Largest overhang of the stage's block above and below everything else [mm]; beyond, the block is cut off."""
+"""Largest overhang of the stage's block above and below all other parts [mm]; the rest of the block is cut off."""
 
 SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5, 2, 1))
 """Scales of ISO 5455: 5:1, 2:1, 1:1, 1:2, 1:5 and so on."""
@@ -85,7 +85,7 @@ class PaperDrawing:
 
     @property
     def core(self) -> tuple[float, float]:
-        """Return the extent along x of what must be seen: leaves, clamps and marked points."""
+        """Return the extent along x of the parts that must be visible: leaves, clamps, marked points."""
         marked = [self.size(point[0]) for point in self.points.values()]
         return min(-CLAMP, *marked), max(self.size(self.mechanism.length) + CLAMP, *marked)
 
@@ -93,7 +93,7 @@ class PaperDrawing:
     def spans(self) -> tuple[tuple[float, float], ...]:
         """Return the extents of the views along x, z and y.
 
-        They hold all that must be seen, and as much of the stage's block as there is room for.
+        The views show all parts that must be visible, and as much of the stage's block as there is room for.
         """
         low, high = self.core
         room = WIDTH - 10 - LEFT - RIGHT - (high - low)
@@ -144,9 +144,9 @@ class PaperDrawing:
         return self.foot + 23 + FOOT
 
     def side(self, x: float, z: float) -> SheetPoint:
-        """Return a place [m] as it stands in the view from the side."""
+        """Convert a place [m] to paper coordinates in the view from the side."""
         return self.x0 + self.size(x), self.z0 - self.size(z)
 
     def top(self, x: float, y: float) -> SheetPoint:
-        """Return a place [m] as it stands in the view from above."""
+        """Convert a place [m] to paper coordinates in the view from above."""
         return self.x0 + self.size(x), self.y0 - self.size(y)

@@ -1,6 +1,6 @@
 """Draw the modes of leaf springs: leaves and stage at rest and deformed.
 
-Each mode is seen from where most of it moves.
+Each mode is seen from the direction that shows most of its motion.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ ASPECT = 1.45
 """Width of a picture over its height."""
 
 HALF = 0.5
-"""Fraction of a mode's energy in the known shape from which the mode is drawn."""
+"""Smallest fraction of a mode's energy in the drawn shape for the mode to be drawn."""
 
 ENOUGH = 0.9
-"""Fraction of all motion from which a view is considered to show a mode."""
+"""Smallest fraction of a mode's motion that a view must show to be chosen."""
 
 FINE = 65
 """Number of points along a drawn leaf."""
@@ -102,7 +102,7 @@ def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
 
 
 def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
-    """Return how a mode moves the corners of the stage's block."""
+    """Return the displacements of the corners of the stage's block in a mode."""
     signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
     return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
 
@@ -113,7 +113,7 @@ def _centre(mechanism: Mechanism) -> Array:
 
 
 def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
-    """Return how points of the stage, shape (n, 3), move with it."""
+    """Return the displacements of points of the stage, shape (n, 3), in a mode."""
     arm = points - np.array([float(mechanism.length), 0.0, 0.0])
     return mode.stage[:3] + np.cross(mode.stage[3:], arm)
 
@@ -153,7 +153,7 @@ def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> li
     """
     x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
-    turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
+    turn -= turn[0]  # the rest at the clamp is shear, nearly constant along the leaf
     sides = []
     for y in (-mechanism.width / 2, mechanism.width / 2):
         rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)

@@ -1,4 +1,4 @@
-"""Say what leaf springs are, allow and endanger."""
+"""Describe leaf springs: their properties, the crossover and stroke they allow, and dangers."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def tables(flexure: BothModels) -> list[AnswerTable]:
 
 
 def findings(flexure: BothModels) -> list[str]:
-    """Say what the joint is, which crossover it allows, and which stroke fatigue allows."""
+    """Describe the joint, the crossover that it allows, and the stroke that fatigue allows."""
     return [_joint(flexure.best), _control(flexure.best), _endurance(flexure.best)]
 
 
 def warnings(flexure: BothModels) -> list[str]:
-    """Return everything that is wrong with the leaf springs."""
+    """Return warnings on everything that is wrong with the leaf springs."""
     failed = f"The beam model found no solution: {flexure.failure.rstrip('.')}. All results are from the closed forms."
     return [
         *([failed] if flexure.beams is None else []),

@@ -1,6 +1,6 @@
 """Declare how results of each kind of experiment are shown, and register these views.
 
-Parts that their figures share stand here, too.
+The module also has parts that the views' figures share.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class PredictionView(Generic[Result]):
 class KindView(Generic[Result]):
     """The view of the results of one kind of experiment.
 
-    It has a `title`. Terminal and page show `facts` and `sentences` with `warnings`. `numbers` go into the JSON
-    document, in SI with the unit in the key or beside it. Names of `figures` begin with the text given.
+    Terminal and page show the `title`, `facts`, `sentences` and `warnings`. `numbers` go into the JSON document, in SI
+    with the unit in the key or beside it. Names of `figures` begin with the text given.
 
     `headline` is a sentence at the head of the page, beside the estimates of keys; it may be empty. `longest` tells
     that the analysis uses only the longest stretch of a log without gaps. `opening` is the last part of the name of the
@@ -92,7 +92,7 @@ def _by_estimates(kind: str) -> KindView[Any]:
         return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
 
     def warnings(result: Any) -> tuple[str, ...]:
-        """Return the warnings of a result that has some."""
+        """Return the warnings of a result, if its class has any."""
         return getattr(result, "warnings", ())
 
     return KindView(kind.replace("-", " ").capitalize(), facts, lambda result: {}, figures, warnings=warnings)

@@ -48,9 +48,9 @@ PALE = "#dbe9f4"
 
 
 def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """Return all figures of one log of moves; their names begin with this one."""
+    """Return all figures of one log of moves; their names begin with `name`."""
     flat = moves.fit.problem.flat
-    apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
+    apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a separate cart, whose speed must be measured
     friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
     return [_force(moves, name), _traces(moves, name), _residual(moves, name), *friction, *_profiles(moves, name)]
 
@@ -152,7 +152,7 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
     inner = slice(
         settings.samples_of_an_edge, -settings.samples_of_an_edge
-    )  # at the ends of a record the filter swings in
+    )  # the filter has transients at the ends of a record
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))

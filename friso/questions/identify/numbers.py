@@ -12,7 +12,7 @@ from friso.questions.map.words import quantity
 from friso.shown.drawing.prefixes import NOTHING, choose, pretty
 
 DIGITS = 2
-"""Significant digits of the half-width of an interval, which also set those of the value."""
+"""Significant digits of the half-width of an interval, which also set the digits of the value."""
 
 MOST = 4
 """Largest number of significant digits of a value without interval."""
@@ -79,7 +79,7 @@ def interval_text(estimate: Estimate) -> str:
     if not (low or high):
         return NOTHING
     factor, unit = _scale(estimate)
-    if low and high and 0 < estimate.low < 1e-2 * estimate.high:  # a range over decades: each end has digits of its own
+    if low and high and 0 < estimate.low < 1e-2 * estimate.high:  # each end has digits of its own
         return f"{digits(estimate.low, unit_of(estimate.unit))} to {digits(estimate.high, unit_of(estimate.unit))}"
     places = _places(estimate, factor)
     ends = [_written(number, factor, places) for number in (estimate.low, estimate.high)]
@@ -115,7 +115,7 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
     Without a value, they suit the range that is possible.
     """
     finite = [estimate.low, estimate.high]
-    if math.isfinite(estimate.value):  # of a value next to 0, its interval tells the size
+    if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale
         finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
     if unit.startswith("N") and FORCES[0] < size < FORCES[1]:

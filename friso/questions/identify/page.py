@@ -1,6 +1,6 @@
 """Write the files of `friso identify`.
 
-They are the stage, the correlations beside it, a page that opens offline, and every figure.
+The files are the stage, its correlations, a page that opens offline, and every figure.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def identify_files(
 ) -> dict[str, Content]:
     """Return all files of an identification.
 
-    A stage file and correlations of an earlier run are removed where there are none now.
+    A stage file or correlations of an earlier run are removed if this run has none.
     """
     stage, correlations = identification.stage, None
     if stage is not None and identification.correlations.keys:

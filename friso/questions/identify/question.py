@@ -239,7 +239,7 @@ def _in_one_line(error: InputError) -> str:
 
 
 def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
-    """Return the stage of a file that lacks tables which a stage `made` up around a log has.
+    """Complete a stage file that lacks tables, from a stage `made` with assumed values.
 
     Raises InputError.
     """
@@ -268,7 +268,7 @@ def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
 
 
 def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, period: TimeLike | None) -> AnalysisSettings:
-    """Return what the user chose for the analyses.
+    """Return the user's choices for the analyses.
 
     Raises InputError.
     """

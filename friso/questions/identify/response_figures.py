@@ -33,7 +33,7 @@ FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
 
 def response_figures(bench: Bench, name: str) -> list[Figure]:
-    """Return all figures of one bench; their names begin with this one."""
+    """Return all figures of one bench; their names begin with `name`."""
     figures = [_bode(bench, name), *_levels(bench, name)]
     if bench.departs is not None:
         figures.append(_departure(bench, name))
@@ -118,7 +118,7 @@ def _around(*several: Array) -> tuple[float, float]:
 
 
 def _levels(bench: Bench, name: str) -> list[Figure]:
-    """Draw response, noise and distortion, where the record shows them."""
+    """Draw response, noise and distortion, if the record shows noise or distortion."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     panels = tuple(_level_panel(response) for response in outputs)
     if min(len(panel.series) for panel in panels) < 2:
@@ -131,7 +131,7 @@ def _levels(bench: Bench, name: str) -> list[Figure]:
 
 
 def _level_panel(response: FrequencyResponse) -> Panel:
-    """Draw the sizes of one output."""
+    """Draw the magnitudes of response, noise and distortion of one output."""
     rows = [("response", GREY, np.abs(response.response)), ("noise", BLUE, response.noise)]
     rows.append(("nonlinear distortion", VERMILLION, response.distortion))
     if not np.isfinite(response.noise).any():
@@ -187,7 +187,7 @@ def _amplitudes(bench: Bench, name: str) -> Figure:
 
 
 def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
-    """Return frequencies [Hz] up to one, and the size of the acceleration per input there."""
+    """Return the frequencies [Hz] up to `high`, and the acceleration per input at each."""
     chosen = (response.frequency > 0) & (response.frequency <= high)
     hertz = response.frequency[chosen]
     return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2

@@ -38,7 +38,7 @@ NO_STAGE = (
 )
 
 NO_NEWTONS = "No stage file is written: its keys need the force in {}."
-"""Where the force of the only moves is in another unit."""
+"""Sentence for moves whose force is in another unit than newtons."""
 
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
 
@@ -50,7 +50,7 @@ POOR = 0.5
 class ExperimentSummary:
     """An experiment in words.
 
-    It has a `label`, of which the names of its figures are made, a title, sentences, numbers by name, and warnings.
+    Fields are a `label`, from which its figures are named, a title, sentences, numbers by name, and warnings.
     """
 
     label: str
@@ -69,7 +69,7 @@ class EstimateRow:
 
 
 def headline(identification: Identification) -> list[tuple[str, str]]:
-    """Say what is identified, and what is not and why; each sentence with its colour."""
+    """Say what is identified, what is not, and why; each sentence has a colour."""
     return [(colour, axis_shown().text(sentence)) for colour, sentence in _headline(identification)]
 
 
@@ -129,7 +129,7 @@ def _absent(estimate: Estimate) -> bool:
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
-    """Name the experiments that would show what is not identified.
+    """Name the experiments that would show the quantities that are not identified.
 
     A kind that was `done` is left out; the reasons say what its logs lacked.
     """
@@ -224,7 +224,7 @@ def _used(logs: Sequence[Source]) -> Facts:
 def labels(identification: Identification) -> list[str]:
     """Return a name for every experiment, from which its figures are named.
 
-    It is the kind, with a number if several experiments are of one kind.
+    The name is the kind, with a number if several experiments are of one kind.
     """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [

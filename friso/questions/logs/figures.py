@@ -16,7 +16,7 @@ MOST = 12
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
-    """Draw a figure for each file of channels, those with a role first."""
+    """Draw a figure for each file of channels; channels with a role come first."""
     return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
 
 
@@ -46,7 +46,7 @@ def _panel(channel: ChannelContent) -> Panel:
 def _within_range(values: np.ndarray) -> np.ndarray:
     """Return the values that a picture can show, which no instrument exceeds.
 
-    Others are NaN, and what is next to 0 is 0.
+    Larger values become NaN, and values next to 0 become 0.
     """
     settings = LogSettings.current()
     sizes = np.abs(values)

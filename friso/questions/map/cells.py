@@ -36,15 +36,15 @@ from friso.studies.metric import metrics, worded
 if TYPE_CHECKING:
     import xarray as xr
 
-SAMPLE = "sample"  # the dimension of maps that are sampled, not gridded
+SAMPLE = "sample"  # dimension of sampled maps, which have no grid
 
 
 @dataclass(frozen=True)
 class CellAxis:
     """A swept key with the places of its cells, in ascending order, shape (n,).
 
-    `positions` are values in SI, or 0, 1, 2, ... if the cells are named by `words`. `places` gives the index in the
-    runs of each cell.
+    `positions` are values in SI, or 0, 1, 2, ... if the cells are named by `words`. `places` has the index of each cell
+    in the runs.
     """
 
     key: str
@@ -56,7 +56,7 @@ class CellAxis:
     places: np.ndarray
 
     def axis(self, limits: tuple[float, float] | None) -> Axis:
-        """Return the axis of a panel."""
+        """Return the axis of a panel for these cells, drawn between `limits` (None: over all cells)."""
         return Axis(self.quantity, self.unit, limits, self.log, self.words)
 
     def text(self, position: int) -> str:
@@ -154,7 +154,7 @@ def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
         words = tuple(_word(str(key), value) for value in coordinate.values)
         return _axis_of_words(key, words, np.arange(len(words)))
     values, places = np.unique(np.asarray(coordinate.values, dtype=float), return_index=True)
-    if log and values[0] <= 0:  # no logarithmic axis reaches zero: cells of equal width, each under its value
+    if log and values[0] <= 0:  # a logarithmic axis cannot reach zero, so cells have equal widths, each with its value
         return _axis_of_words(key, tuple(_value(value, unit) for value in values), places)
     return CellAxis(str(key), quantity(key), unit, log, values, (), places)
 
@@ -222,7 +222,7 @@ def look(runs: xr.Dataset, metric: str) -> Look:
 
 
 def coloured(runs: xr.Dataset) -> list[str]:
-    """List the variables that a map can show, the words last."""
+    """List the variables of a sweep that a map can colour: numbers first, then outcomes in words."""
     numeric = [str(name) for name, array in runs.data_vars.items() if array.dtype.kind in "iuf"]
     return numeric + [name for name in worded() if name in runs]
 
@@ -230,9 +230,9 @@ def coloured(runs: xr.Dataset) -> list[str]:
 def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
-    Limits that a metric defines are taken as they are. Counts get one colour each, 0 that of a stage at rest. Numbers
-    that span more than three decades get a logarithmic scale of at most six: anything smaller is solver noise of a
-    stage at rest.
+    Limits that a metric defines are taken as they are. Each count gets one colour; 0 gets the colour of a stage at
+    rest. Numbers that span more than three decades get a logarithmic scale of at most six: anything smaller is solver
+    noise of a stage at rest.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:

@@ -1,4 +1,4 @@
-"""Collect what a map page knows of its runs: axes, variables and colours.
+"""Collect the data of a map page: axes, variables and colours of the runs.
 
 The page's script reads it as JSON.
 """
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 
     from friso.studies.traces import Traces
 
-MOST = 250_000  # cells in a page: more would take a browser seconds to open and to colour
+MOST = 250_000  # most cells in a page: more take a browser seconds to open and colour
 
-NONE = 255  # in bytes of codes: no category, the number counts
+NONE = 255  # code for a cell without a category, whose number counts
 
 
 def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def machine_of(runs: xr.Dataset) -> Stage | None:
         return None
     try:
         return loads(runs.attrs.get("stage", ""))
-    except InputError:  # of runs that are no study of friso's
+    except InputError:  # for runs that are no study of friso
         return None
 
 
@@ -120,8 +120,8 @@ HIGHEST = 250
 def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
     """Return the runs as lines, for each cell.
 
-    Each run has the range that shows its final behaviour. Heights are bytes from 0 to HIGHEST, from half a range below
-    it to half a range above it; lines are cut there.
+    Each run has the range that shows its final behaviour. Heights are bytes from 0 to HIGHEST, which cover the range
+    and half a range beyond either end; lines are cut there.
     """
     outcome = runs["outcome"]
     of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
@@ -156,7 +156,7 @@ def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dic
 
 
 def _edge(runs: xr.Dataset, metric: str, order: list[CellAxis]) -> list[list[float | None]] | None:
-    """Return the curve on which hunting ends, in the units of the axes; None where the map has no such curve."""
+    """Return the curve on which hunting ends, in the units of the axes; None without one."""
     curves = edge_of_hunting(runs, metric, *order)
     factors = [choose(axis.positions, axis.unit, log=axis.log)[0] for axis in order]
     return [

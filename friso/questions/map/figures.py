@@ -21,10 +21,10 @@ from friso.studies.metric import metrics
 if TYPE_CHECKING:
     import xarray as xr
 
-SLICES = 9  # panels of a map over more than two axes
+SLICES = 9  # largest number of panels of a map over more than two axes
 RED = "#e3001b"  # the evaluation marker of the thesis
 
-_LISTED = 12  # left-out values named one by one
+_LISTED = 12  # largest number of left-out values that are named one by one
 
 
 def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
@@ -57,7 +57,7 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
 
 
 def _subject(metric: str) -> str:
-    """Return what a cell of a map stands for: a run, or the stage whatever its motion."""
+    """Return what a cell of a map represents: one run, or the stage under any motion."""
     return "stage" if metric in metrics() and metrics()[metric].source != "run" else "run"
 
 
@@ -99,7 +99,7 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 
 
 def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
-    """Return the curve that separates cells in which hunting attracts from the others, over two axes."""
+    """Return the curve over two axes that separates cells in which hunting attracts."""
     colouring = look(runs, metric)
     codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
     return _edges(x, y, colouring, codes)
@@ -108,7 +108,7 @@ def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> 
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 
-    It runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve.
+    The curve runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve.
     """
     attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
     if min(codes.shape) < 2 or x.words or y.words or not attracted:

@@ -1,4 +1,4 @@
-"""Say in which part of a map the stage swings or hunts, where that is, and how far it can be trusted."""
+"""Say in which part of a map the stage swings or hunts, and how far the map can be trusted."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ _QUIET = ("transient", "settles")
 def headline(runs: xr.Dataset, name: str) -> str:
     """Return the first statement of a map: where, and in which fraction of it, its finding holds.
 
-    The finding is what the metric is asked for (`Metric.findings`). Doubts follow. It is empty if the runs have no
-    outcome.
+    The metric declares its findings (`Metric.findings`). Doubts follow the statement, which is empty if the runs have
+    no outcome.
     """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
@@ -127,7 +127,7 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
 
 
 def _percent(part: int, total: int) -> str:
-    """Write a fraction; only an exact one is shown as 0 or 100 %."""
+    """Write a fraction in percent; only exactly none or all is shown as 0 or 100 %."""
     share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"
@@ -173,7 +173,7 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
-    """Say where counts on a map, or verdicts, disagree with the end of the run."""
+    """Say in how many cells peak counts or verdicts disagree with the end of the run."""
     if name in worded(verdicts=True) and name != "outcome" and {name, "outcome"} <= set(runs.data_vars):
         hidden = int(((runs[name].values == "hunts") & np.isin(runs["outcome"].values, (RESTS, CREEPS))).sum())
         text = (
@@ -274,6 +274,6 @@ def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
 
 def loop_first(stage: Stage) -> list[str]:
     """Say that the loop of the stage as given is unstable, if it is."""
-    from friso.hunting import unstable  # looking at a map needs no engine
+    from friso.hunting import unstable  # imported here, because looking at a map needs no engine
 
     return unstable_loop(unstable(stage))

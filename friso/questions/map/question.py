@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from friso.shown.files import Content, Files
 
 LARGE = 10_000_000
-"""Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
+"""Number of cells above which a study must be confirmed: it takes minutes and a gigabyte."""
 
 
 class SweepAnswer(Answer):
@@ -354,7 +354,7 @@ def _another_study(store: Path) -> InputError:
 
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
-    """Return the relative tolerance asked for.
+    """Return the relative tolerance that the user chose.
 
     With "auto", it is chosen on a sample of the cells, and logged.
     """
@@ -403,7 +403,7 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
 def _filled(
     study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
 ) -> tuple[xr.Dataset, bool]:
-    """Run what the store lacks, and return the runs and whether the store can take notes.
+    """Run the cells that a store lacks; return the runs and whether the store can take notes.
 
     If the run ends early, a message says how much is stored and how to resume. A complete store that cannot be written
     is read instead, unless figures `beside` it have to be noted in it.
@@ -445,7 +445,7 @@ def _filled(
 
 def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
     """Return the paths of exports. Raises InputError for a path that cannot be written."""
-    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays one
+    files = [Path(os.path.realpath(path) if os.path.islink(path) else path) for path in export]  # a link stays a link
     for path in files:
         refuse_place("export", path)
         if path.suffix not in (".nc", ".csv") or path.is_dir():

@@ -1,4 +1,4 @@
-"""Build the study that a sweep asks for, and write the files beside its store.
+"""Build the study of a sweep, and write the files beside its store.
 
 A study that is too large is refused with an estimate of its cost.
 """
@@ -50,7 +50,7 @@ BYTES = 8
 
 @dataclass(frozen=True)
 class Varied:
-    """The options that say what is varied, as the user gave them."""
+    """The options on which keys are varied and how, as the user gave them."""
 
     axes: Mapping[str, AxisValues] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
@@ -81,7 +81,7 @@ class Varied:
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
-    """Return the study asked for.
+    """Build the study that the options describe.
 
     Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its
     cost.
@@ -138,11 +138,11 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     from friso.studies.store import read_store
     from friso.studies.store_folder import remove_leftovers
 
-    remove_leftovers(store)  # one that was being replaced is put back
+    remove_leftovers(store)  # a store that was being replaced is put back
     try:
         with read_store(store) as runs:
             stored, equations = study_of(runs), str(runs.attrs.get("equations"))
-    except StoreError:  # there is none, or it will be refused
+    except StoreError:  # there is no store, or it will be refused
         return study
     if replace(study, metrics=stored.metrics).differences(stored, equations):
         return study
@@ -165,7 +165,7 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     """Build the refusal of a large study, with its time and disk space estimated by a trial."""
     from friso.studies.execute import run_scattered
 
-    run_scattered(trial, np.arange(crew.size), crew)  # has the kernels compiled
+    run_scattered(trial, np.arange(crew.size), crew)  # compiles the kernels
     start = time.perf_counter()
     run_scattered(trial, np.arange(trial.cells), crew)
     hours = (time.perf_counter() - start) / trial.cells * runs / 3600
@@ -188,7 +188,7 @@ def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> T
 
 
 def place_of_store(folder: str | os.PathLike[str]) -> Path:
-    """Return the folder of a store, with a name of its own even for "." or "..".
+    """Return the absolute folder of a store, so that even "." or ".." has a name.
 
     Raises InputError for a folder without a name, such as the root.
     """

@@ -29,7 +29,7 @@ _QUANTITIES = {
     "masses.cart": "Cart mass",
     "masses.stage": "Stage mass",
 }
-QUIET = "#d3e6f3"  # rest: a pale blue, far from every colour of swings and from white and grey
+QUIET = "#d3e6f3"  # colour of rest: a pale blue, far from the colours of swings and from white and grey
 INVALID = Category("invalid", "#b4b4b4")
 FAILED = Category("failed", INK)
 NOT_RUN = Category("not run", "#ffffff")
@@ -54,7 +54,7 @@ def quantity(key: Hashable) -> str:
 
 
 def in_sentence(key: Hashable) -> str:
-    """Return a key in words within a sentence: "joint stroke"; names of people keep their capital."""
+    """Return a key in words for within a sentence: "joint stroke"; proper names keep capitals."""
     name = quantity(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 

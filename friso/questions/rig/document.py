@@ -11,7 +11,7 @@ from friso.studies.rig.outcome import Outcome
 
 
 def rig_document(outcome: Outcome) -> dict[str, Any]:
-    """Return the results of the experiment, and its logs with the seeds of their noise."""
+    """Return the results of an experiment, and its logs with the seeds of their noise."""
     logs = [
         {"name": log.name, "seed": log.seed, "interval_s": log.interval, "failure": log.failure or None}
         for log in outcome.logs

@@ -19,8 +19,7 @@ from friso.studies.rig.outcome import Outcome
 class OutcomeView:
     """The view of an experiment's outcome.
 
-    It has sentences for the engineer who decides, figures arranged as in the thesis, and numbers for the JSON
-    document.
+    Fields are functions for sentences, for figures arranged as in the thesis, and for numbers of the JSON document.
     """
 
     sentences: Callable[[Outcome], list[str]]

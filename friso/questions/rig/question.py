@@ -13,7 +13,7 @@ from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import SAMPLE_TIME
 
 MANY = 4
-"""Samples from which a delay is worth a word."""
+"""Smallest delay, in samples, that is mentioned."""
 
 
 class RigAnswer(Answer):

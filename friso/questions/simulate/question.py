@@ -70,7 +70,7 @@ class SimulateAnswer(Answer):
 
     @cached_property
     def dwells(self) -> Sequence[Dwell]:
-        """Return how the stage settles at each place where its reference stands, if these are more than two."""
+        """Return how the stage settles wherever its reference stands, if at more than two places."""
         from friso.equations.motion import stands
         from friso.hunting import dwells, dwells_of_trace
 
@@ -88,7 +88,7 @@ class SimulateAnswer(Answer):
         return "" if done else "the computation could not be completed; see the status above"
 
     def sentences(self) -> Sequence[str]:
-        """Return what the run does, how it settles at several places, and what its moves are too short for."""
+        """Say what the run does, how it settles at several places, and if its moves are too short."""
         from friso.equations.motion import ends_evenly, rests
         from friso.questions.simulate.words import built_sentence, conclusion
         from friso.shown.motion_words import dwell_sentences, motion_sentences
@@ -175,7 +175,7 @@ def simulate(
     if cell is None:
         source: Any = stage
         if isinstance(stage, list | tuple) and len(stage) == 1:
-            source = stage[0]  # as the command line has it
+            source = stage[0]  # as given on the command line
         if source is None or isinstance(source, list | tuple):
             raise InputError(
                 "STAGE.toml", " ".join(map(str, source or [])), "one stage file", "friso simulate rig.toml"

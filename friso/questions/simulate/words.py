@@ -21,8 +21,8 @@ def conclusion(
 ) -> str:
     """Say what the run of a stage does.
 
-    Its reference stands in the end, or else `moves_on`, at an even velocity or not. `deviation` holds samples of its
-    deviation [m], evenly over time, shape (n,).
+    `moves_on` tells that the reference moves at the end, and `evenly` that its velocity is then constant. `deviation`
+    has evenly timed samples of the deviation from the reference [m], shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
@@ -44,7 +44,7 @@ def conclusion(
 
 
 def built_sentence(stage: Stage) -> str:
-    """Say what of the machine as built the run has taken into account."""
+    """Say which properties of the machine as built the run includes."""
     tables = listed([f"[{name}]" for name in AS_BUILT if getattr(stage, name)], "and")
     what = f", with {tables}" if tables else ""
     return f"The drive ran as built, sample by sample{what}; --continuous leaves that out."

@@ -77,8 +77,8 @@ Lines = Sequence[ShownRemedy]
 def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
     """Return the stages that are drawn, with their lines.
 
-    These are the stage as it is, the least change and the fastest remedy, with the controller alone and with a joint.
-    If none works, remedies that are not sure to work are drawn.
+    The stages are: the stage as it is, and the least change and the fastest remedy, both with the controller alone and
+    with a joint. If none works, unsure remedies are drawn.
     """
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in _shown(tuning):
@@ -114,7 +114,7 @@ def _name(outcome: RemedyOutcome) -> str:
 def _response(tuning: Advice, lines: Lines) -> Panel:
     """Return the panel of the deviation after the move, for each stage drawn.
 
-    The range shows what the stage as it is does in the end.
+    The range of the axis shows the final behaviour of the stage as it is.
     """
     flat = tuning.stage.flat()
     corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
@@ -123,7 +123,7 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
         after = np.asarray(trace["time"]) >= corner
         off = np.asarray(trace["position"] - trace["reference"])[after]
         series.append(Series(np.asarray(trace["time"])[after] - corner, off, *line))
-        if outcome is None:  # what it does in the end is to be seen
+        if outcome is None:  # the final behaviour must be visible
             shown_to = max(shown_to, 1.2 * float(np.abs(off[len(off) // 2 :]).max()))
     y = Axis("Deviation", "m", (-shown_to, shown_to))
     settled = [slowest(outcome, tuning.goal) for _, outcome, _ in lines if outcome]
@@ -142,7 +142,7 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
         for measured, _ in drawn
         if measured
     )
-    end = max(flat["motion.duration"] - float(last_corner(flat)), float(longest))  # the way there may take longer
+    end = max(flat["motion.duration"] - float(last_corner(flat)), float(longest))  # the move itself may take longer
     start = 1e-3 * end
     series = []
     for measured, line in drawn:

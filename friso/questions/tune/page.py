@@ -60,7 +60,7 @@ def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Con
 
 
 class Behind(NamedTuple):
-    """A part of the page behind a title: sentences and facts; `open` if it is seen at once."""
+    """A foldable part of the page: title, sentences and facts; `open` if unfolded at first."""
 
     title: str
     sentences: Sequence[str]

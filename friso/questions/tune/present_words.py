@@ -26,7 +26,7 @@ DOUBTS = {
 
 
 def as_it_is(tuning: Advice) -> str:
-    """Say whether the stage as it is has a limit cycle, and which parts of the goal fail on how many machines."""
+    """Say whether the stage as it is hunts, and on how many machines it misses which goal."""
     verdict, certain = tuning.case.verdict, tuning.case.judgement.hunting.certain
     if verdict in ("hunts", "bistable"):
         own = f"a limit cycle{' after other moves than its own' * (verdict == 'bistable')}, and"
@@ -37,7 +37,7 @@ def as_it_is(tuning: Advice) -> str:
 
 
 def _missed(name: str, tuning: Advice) -> str:
-    """Say that the stage misses a part of the goal, with the fraction of machines and moves if these tell it."""
+    """Say that the stage misses a part of the goal, and on which fraction of machines."""
     present, goal = tuning.present, tuning.goal
     meets = present.meets(goal)
     every = np.all([*meets.values()], axis=0)

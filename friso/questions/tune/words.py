@@ -1,6 +1,6 @@
 """Describe the remedies in words.
 
-It is said what to change, what that brings and costs, and what cannot work and why.
+The sentences say what to change, what the change brings and costs, and which remedies fail and why.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def number(value: float, unit: str) -> str:
 
 
 def answer(tuning: Advice) -> list[str]:
-    """Return the answer: the least change that works, what it brings and costs, and the next best."""
+    """Write the answer: the least change that works, its benefits and costs, and the next best."""
     lines = [*unstable_loop(tuning.case.unstable), *_interrupted(tuning)]
     if not tuning.needed:
         return [
@@ -145,7 +145,7 @@ def answer(tuning: Advice) -> list[str]:
 
 
 def _in_short(tuning: Advice) -> Iterator[str]:
-    """Yield the least change and what settles soonest, each with its time; nothing if they are the same."""
+    """Yield the least change and the fastest remedy, each with its time; nothing if equal."""
     least, fastest = tuning.least, tuning.fastest
     if least is None or fastest is None or least is fastest:
         return
@@ -481,10 +481,10 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
-    some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
+    some = bool(broken["margin"].any())  # these settings lack the margin and are not mentioned
     tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} tried)"
     brings, still_settles = f"{tried} brings", f"{tried} still settles"
-    if len(left) == 1:  # nothing varies
+    if len(left) == 1:  # no setting is varied
         brings, still_settles = "It does not bring", "It does not settle any more"
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {

@@ -68,11 +68,12 @@ class MetPart:
 
 @dataclass(frozen=True)
 class ClaimInSpace:
-    """A claim over joint draws.
+    """Result of testing a claim of the thesis on joint random draws of the unstated values.
 
-    `seeds` (seed, number) are those of the draws. `holds` is the fraction of draws in which the claim holds, and
-    `parts` tell the same for each part. `hangs_on` are the values on which that depends, the most decisive first.
-    `failures` say, by the number of the draw, why it could not be computed.
+    `seeds` identifies each draw by (random seed, number of the draw); `holds` is the fraction, and `count` the number,
+    of draws in which the claim holds, and `parts` has the fraction for each part of the claim. `hangs_on` lists the
+    drawn values that decide whether the claim holds, the most decisive first. `failures` maps the number of a draw to
+    the reason why the claim could not be computed for it.
     """
 
     seeds: tuple[tuple[int, int], ...]

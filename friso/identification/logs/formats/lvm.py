@@ -52,18 +52,18 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
 
 
 def _above(segment: dict[str, Any], key: str, column: int) -> Any:
-    """Return what the header says of a column, None for nothing."""
+    """Return a header's value for a column; None if the header has no such key."""
     row = segment.get(key, [])
     return row[column] if 0 <= column < len(row) else None
 
 
 def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
-    """Return `n` instants from a start on, a step apart; None without a step."""
+    """Return `n` instants from `start` on, `step` apart; None without a step."""
     return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
 
 
 def _recognise(head: FileHead) -> bool:
-    """Tell a LabVIEW measurement text by its first bytes."""
+    """Tell whether a file is a LabVIEW measurement text, by its first bytes."""
     return head.start.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement")
 
 

@@ -20,7 +20,7 @@ from friso.identification.logs.units import split_heading
 
 @dataclass
 class _Contents:
-    """Contents of a file, collected in a walk through its tree."""
+    """Contents of a MAT file, collected while walking through its tree."""
 
     channels: list[Channel] = field(default_factory=list)
     scalars: dict[str, float] = field(default_factory=dict)
@@ -56,7 +56,7 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
 
 
 def _walk(node: Any, name: str, walk: _Contents) -> None:
-    """Take the channels, numbers and objects of a node of the tree (dict, list, array, str)."""
+    """Collect the channels, numbers and objects below a node (dict, list, array, str)."""
     if isinstance(node, dict) and OBJECT in node:
         walk.objects.append(f"{name} ({node[OBJECT]})")
     elif (
@@ -78,7 +78,7 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
 
 
 def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
-    """Take an array as one number, one channel, or one channel per column."""
+    """Collect an array as one number, one channel, or one channel per column."""
     values = np.squeeze(values)
     if values.ndim == 0:
         walk.scalars[name] = float(values)
@@ -93,7 +93,7 @@ def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
 
 
 def _structures(node: Any) -> list[dict[str, Any]]:
-    """Return a structure array as a list of structures, one alone too."""
+    """Return a structure array, or a single structure, as a list of structures."""
     return [item for item in (node if isinstance(node, list) else [node]) if isinstance(item, dict)]
 
 
@@ -116,7 +116,7 @@ def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
 def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel]:
     """Return the channels of Simulink's structure with time.
 
-    They are `signals(i).values` over `time` [s].
+    The channels are `signals(i).values` over `time` [s].
     """
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
@@ -131,7 +131,7 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
             _text(curve.get("label")) or _text(curve.get("blockName")).rpartition("/")[2] or source
         )
         columns = values.reshape(time.size, -1).T
-        named = [part.strip() for part in heading.split(",")]  # of signals that come through one line
+        named = [part.strip() for part in heading.split(",")]  # several signals share one line of the Simulink model
         for k, column in enumerate(columns):
             label = heading if len(columns) == 1 else named[k] if len(named) == len(columns) else f"{heading}({k + 1})"
             out.append(Channel(f"{name}/{label}", unit, column, time, source))
@@ -139,12 +139,12 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
 
 
 def _text(node: Any) -> str:
-    """Return a text node, "" for anything else."""
+    """Return the text of a node; "" if it is no text."""
     return node.strip() if isinstance(node, str) else ""
 
 
 def _recognise(head: FileHead) -> bool:
-    """Recognise a MAT file by its first bytes, by the bytes after MATLAB's header block, or by its name."""
+    """Recognise a MAT file by its first bytes or by its name."""
     start = head.start
     return start.startswith(b"MATLAB ") or is_hdf5(start) or head.path.suffix.lower() == ".mat"
 

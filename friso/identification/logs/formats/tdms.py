@@ -13,7 +13,7 @@ from friso.identification.logs.units import split_heading
 
 
 def read_tdms(path: Path) -> ChannelTable:
-    """Read a file of National Instruments TDMS.
+    """Read the channels of a TDMS file of National Instruments.
 
     Raises LogError.
     """

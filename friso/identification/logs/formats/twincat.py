@@ -22,12 +22,12 @@ from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 
 _FILETIME = 1e15
-"""Value above which a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a
-double it is accurate to 16 steps, 1.6 us, which the fit of an even time base averages out."""
+"""Value above which a time is a FILETIME, which counts 100 ns since 1601 (1.3e17 in 2022). As milliseconds the value
+would be 30 000 years. A double resolves a FILETIME to 16 steps, 1.6 us, which the fit of an even time base averages
+out."""
 CERTAIN = ("\t", ";", ",")
 DELIMITERS = (*CERTAIN, ":", " ")
-"""Characters that Scope may write between cells. A first line "Name x" with one of the last two may be that of any
-text."""
+"""Delimiters that Scope may write. With one of the last two, a first line "Name x" may come from any text."""
 _MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", "Data-Type")
 
 
@@ -40,7 +40,7 @@ def is_twincat(lines: list[str]) -> bool:
     if any(line.startswith(_MARKS) for line in head):
         return True
     named = [i for i, line in enumerate(head) if line.startswith(first[:5])]
-    below = [head[i + 1] for i in named if i + 1 < len(head)]  # numbers where the export has no other rows of keys
+    below = [head[i + 1] for i in named if i + 1 < len(head)]  # a row of numbers where no other row has keys
     return delimiter in CERTAIN and any(_is_data(_cells(line, delimiter)) for line in below)
 
 
@@ -90,7 +90,7 @@ def _without_end(frame: Any) -> Any:
 def _channels(
     path: Path, form: TextLayout, table: dict[str, list[str]], frame: Any
 ) -> tuple[tuple[Channel, ...], list[str]]:
-    """Return the channels of all groups, and lines that tell of them.
+    """Return the channels of all groups, and lines on how they were read.
 
     Raises LogError.
     """
@@ -142,13 +142,13 @@ def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.nd
 
 
 def _source(column: int, info: dict[str, str]) -> str:
-    """Return the place of a channel in the file, in words."""
+    """Describe a channel's place in the file."""
     texts = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
     return ", ".join([f"column {column + 1}", *texts])
 
 
 def _scaled(table: dict[str, list[str]]) -> list[str]:
-    """Write a line on channels with an offset or a scale, which exported values already contain."""
+    """Write a line on channels with an offset or a scale, already applied to exported values."""
     scaled = []
     for i, name in enumerate(table["Name"]):
         offset, scale = (table.get(key, [])[i : i + 1] for key in ("Offset", "ScaleFactor"))

@@ -15,7 +15,7 @@ from friso.identification.logs.measured_response import MeasuredResponse, check_
 from friso.identification.logs.units import unit_factor
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
-"""Function types of record 6."""
+"""Function types in record 6 of a dataset 58."""
 _SYSTEMS = {
     1: ("m", "N"),
     2: ("ft", "lbf"),
@@ -38,7 +38,7 @@ def is_uff(head: bytes) -> bool:
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """Return the datasets 58 of a universal file, each with its code of units (`units_code`).
+    """Return the datasets of type 58 of a universal file, each with its `units_code`.
 
     Raises LogError for none.
     """
@@ -51,7 +51,7 @@ def sets_58(path: Path) -> list[dict[str, Any]]:
 
 
 def label(data: dict[str, Any], key: str) -> str:
-    """Return a text of a dataset, "" for NONE."""
+    """Return a text field of a dataset; "" if the file says NONE."""
     text = str(data.get(key, "") or "").strip()
     return "" if text.upper() == "NONE" else text
 
@@ -83,12 +83,12 @@ def _unit(data: dict[str, Any]) -> str:
 
 
 def _seconds(data: dict[str, Any]) -> np.ndarray:
-    """Return the instants; in seconds unless their label states another unit of time."""
+    """Return the instants in seconds, converted if their label states another unit of time."""
     return _axis(data) * (unit_factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
 
 
 def _axis(data: dict[str, Any]) -> np.ndarray:
-    """Return the abscissa: stored, or from its start and step."""
+    """Return the abscissa of a dataset, as stored or from its start and step."""
     stored = np.asarray(data.get("x", ()), dtype=float)
     if stored.size == np.size(data["data"]):
         return stored

@@ -1,6 +1,6 @@
 """Show the results of `friso rig hunting`.
 
-These are Fig. 24 and 25 of the thesis, and the fraction of rails with counted peaks.
+The results are shown as in Fig. 24 and 25 of the thesis, with the fraction of rails on which peaks are counted.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _reach(traces: list[Trace]) -> float:
 def _crossovers(moves: HuntingResult) -> Figure:
     """Draw the error after the move at several crossovers, with the joint locked and free.
 
-    These are the thesis's crossovers, and the one beyond which no peaks are counted.
+    The crossovers are the thesis's, and the highest with counted peaks.
     """
     panels = []
     reach = _reach([moves.traces["locked", row] for row in moves.plotted])
