@@ -178,11 +178,12 @@ def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("bias", [5.0, -5.0])
 def test_a_reference_that_stands_still_is_no_measure_of_length(bias: float) -> None:
-    """Constant forces set the stage in motion: tolerances follow from the friction, whatever the reference does."""
+    """Constant forces that nothing carries set the stage in motion: tolerances follow from the friction, whatever the
+    reference does."""
     slow = {"bias.cart": f"{bias} N", "bias.stage": "1e-6 N", "controller.crossover": "4 Hz"}
     flat = stage(HOLD, friction=lugre(2), controller=van_dijk()).replace(slow).flat() | {"motion.duration": 5.0}
     shape = kernel(structure(flat))
-    (runs,) = run_chunks(shape, flat, 1, RunOptions(interval=0.1))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(interval=0.1), starts=np.zeros((1, shape.initial_size)))
     ours, times = runs.results.samples[0], np.arange(51) * 0.1
     theirs = radau(flat, shape.states, np.max(np.abs(ours), axis=0), times)
     length = flat["friction.static"] / float(shape.module.stiffness(shape.values(flat | {"motion.size": 0.0}, 1))[0][0])

@@ -794,6 +794,6 @@ def test_every_key_says_where_it_comes_from(wording: Wording) -> None:
     assert lines["coulomb"] == "identified: output error"
     assert lines["static"] == NOT_IDENTIFIED
     wording(lines["bristle_stiffness"])
-    assert all(comment for key, comment in lines.items() if key not in ("name", "source"))
+    assert all(comment for key, comment in lines.items() if key not in ("name", "source", "note"))
     beside = origins(whole, estimates, {}, ["friction.bristle_stiffness"])
     assert beside["friction.bristle_stiffness"] != beside["friction.viscous"] == beside["controller.crossover"]
