@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.errors import InputError
+from friso.escapes import escaped
 from friso.interface.drafts import DRAFTS, Drafts, made
 from friso.platform import paths
 from friso.platform.interrupts import hold_interrupts
@@ -116,7 +117,8 @@ class OutputFolder:
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
         if earlier:
-            LOGGER.warning(f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there")
+            text = f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there"
+            LOGGER.warning(escaped(text))
         return written(contents)
 
     def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
