@@ -216,10 +216,10 @@ def test_stages_are_counted_by_class_of_machine() -> None:
 
 def outcome(number: int, wrong: bool = False) -> dict[str, Any]:
     """Return an invented outcome of an attack on a stage."""
-    ends_as = {"verdict": WRONG if wrong else STOOD, "edge": GIVEN_UP}
+    ends_as = {"verdict": WRONG if wrong else STOOD, "edge": GIVEN_UP, "static friction": STOOD}
     classes = ["joint: free"] if number % 2 else ["joint: rigid", "backlash"]
     claim = {"says": "given: hunts", "case": "given", "classes": classes, "verdict": "hunts", "sure": True, "edge": 1.1}
-    claims = [claim | {"edge_sure": True, "doubts": {}, "outcomes": ends_as}]
+    claims = [claim | {"edge_sure": True, "friction_sure": number != 4, "doubts": {}, "outcomes": ends_as}]
     refuted = [{"case": "given", "of": "verdict", "sure": True, "why": "no start swings on"}] if wrong else []
     stage = {"series": "stages", "seed": 1, "number": number, "cpu": 0.1, "work": 1.0, "attack_cpu": 0.2, "error": ""}
     return stage | {"claims": claims, "refuted": refuted}
@@ -229,11 +229,11 @@ def test_attacks_are_told_by_class_and_in_a_table(tmp_path: Path) -> None:
     kept = KeptAttacks(tmp_path / "attacks.jsonl")
     records = [kept.add(outcome(number, wrong=number == 2)) for number in range(5)]
     tally = document(records)
-    assert [tally["all"][key] for key in COLUMNS] == [5, 5, 5, 4, 1, 5, 5, 0, 0]
-    assert [tally["classes"]["backlash"][key] for key in COLUMNS] == [3, 3, 3, 2, 1, 3, 3, 0, 0]
+    assert [tally["all"][key] for key in COLUMNS] == [5, 5, 5, 4, 1, 5, 5, 0, 0, 5, 4, 4, 0]
+    assert [tally["classes"]["backlash"][key] for key in COLUMNS] == [3, 3, 3, 2, 1, 3, 3, 0, 0, 3, 2, 2, 0]
     assert [witness["stage"] for witness in tally["wrong"]] == ["stages 1:2"]
     assert len(tally["given_up"]) == 5
-    assert "| backlash | 3 | 3 | 3 | 2 | 1 | 3 | 3 | 0 | 0 |" in page(records, tally)
+    assert "| backlash | 3 | 3 | 3 | 2 | 1 | 3 | 3 | 0 | 0 | 3 | 2 | 2 | 0 |" in page(records, tally)
 
 
 class Attacked:
