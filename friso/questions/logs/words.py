@@ -72,7 +72,9 @@ def next_command(content: LogContent) -> str | None:
     """
     scales = [f'--scale force="YOUR MOTOR CONSTANT N/{channel.unit}"' for channel in _currents(content)]
     scaled = any(option.startswith("--scale force") for option in content.options)
-    options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps), *([] if scaled else scales)])
+    examples = [gap.example for gap in content.gaps]
+    shown: list[str] = [*content.options, *examples, *([] if scaled else scales)]
+    options = dict.fromkeys(shown)
     if "" in options:
         return None
     return " ".join(["friso identify", shell_word(str(content.path)), *options])
