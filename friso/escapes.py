@@ -6,6 +6,7 @@ Their characters must not control a terminal, reverse the reading direction, or 
 from __future__ import annotations
 
 import json
+import logging
 import re
 
 _STEERING = re.compile(
@@ -56,3 +57,12 @@ def _as_in_toml(match: re.Match[str]) -> str:
 def _written_out(match: re.Match[str]) -> str:
     code = ord(match[0])
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
+
+
+def _escape_record(record: logging.LogRecord) -> bool:
+    """Escape the message of a log record; keep the record."""
+    record.msg, record.args = escaped(record.getMessage()), None
+    return True
+
+
+logging.getLogger("friso").addFilter(_escape_record)  # whoever collects the records gets safe texts, too

@@ -2,6 +2,7 @@ r"""Texts of files that are shown: nothing of theirs steers a terminal, a reader
 
 import io
 import json
+import logging
 import re
 import sys
 import unicodedata
@@ -168,3 +169,9 @@ def test_friso_draws_on_the_terminal_itself() -> None:
     assert "Axis:x:pos" in screen.getvalue()
     assert out.isatty()
     assert sys.stdout is not out
+
+
+def test_whoever_collects_log_records_gets_safe_texts(caplog: pytest.LogCaptureFixture) -> None:
+    """A folder whose name is no text reached a record raw, and a collector could not encode it."""
+    logging.getLogger("friso").warning("%s and %s", "\x1b[2J", "o\udcff")
+    assert caplog.messages == ["\\x1b[2J and o\\udcff"]

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.errors import InputError
-from friso.escapes import escaped
 from friso.interface.drafts import DRAFTS, Drafts, made
 from friso.platform import paths
 from friso.platform.interrupts import hold_interrupts
@@ -117,8 +116,7 @@ class OutputFolder:
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
         if earlier:
-            text = f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there"
-            LOGGER.warning(escaped(text))
+            LOGGER.warning(f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there")
         return written(contents)
 
     def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
