@@ -44,7 +44,7 @@ def so_far(design: UnfinishedDesign) -> list[str]:
     """Say what is decided of a design that was not verified, and what is not known of it."""
     crossover = design.stage.flat()[CROSSOVER]
     if not design.interrupted:
-        wanted = f"An isolator that was not tried in moves: {isolator(design.fitted, crossover)}. With --anyway it is."
+        wanted = f"An isolator, not tried in moves (--anyway tries it): {isolator(design.fitted, crossover)}."
         return [need_words(design.need), wanted]
     hunts = (
         "whether the machine hunts with it is not known"
