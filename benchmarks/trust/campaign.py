@@ -25,7 +25,7 @@ from benchmarks.trust.commands import COMMANDS, LeftOut
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.questions import questions
 from benchmarks.trust.readers import BINARY, READERS
-from benchmarks.trust.stages import stages
+from benchmarks.trust.stages import computed_stages, stages
 from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
 
@@ -36,7 +36,14 @@ Case = Callable[[random.Random, Path], None]
 """A case: a function of its random numbers and its folder, which raises what it finds wrong."""
 
 
-CASES: dict[str, Case] = {**ARGUMENTS, "drawn-stages": stages, "app": questions, **WRITING, **COMMANDS}
+CASES: dict[str, Case] = {
+    **ARGUMENTS,
+    "drawn-stages": stages,
+    "computed-stages": computed_stages,
+    "app": questions,
+    **WRITING,
+    **COMMANDS,
+}
 """Campaigns besides those of `READERS`."""
 
 NAMES = (*READERS, *CASES)
@@ -45,8 +52,8 @@ NAMES = (*READERS, *CASES)
 BINARY_LOGS = [f"{kind}-logs" for kind in BINARY]
 """Campaigns of binary logs."""
 
-HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "options": 32, "app": 8, "stores": 16,
-         "store-faults": 32, "store-views": 16, "store-exchanges": 32, "store-versions": 8,
+HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "drawn-stages": 8, "computed-stages": 64, "options": 32,
+         "app": 8, "stores": 16, "store-faults": 32, "store-views": 16, "store-exchanges": 32, "store-versions": 8,
          **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """Factor by which campaigns with slow cases have fewer cases."""
 

@@ -1,15 +1,17 @@
 """Draw stages from all that the schema of the stage file allows.
 
 Tables, kinds and keys are random, with the values of the schema's examples. Contradictions are mended as the error
-says, or left out. Every function must accept such a stage, or refuse it in one clear message. Nothing is computed.
+says, or left out. Every function must accept such a stage, or refuse it in one clear message.
 """
 
 from __future__ import annotations
 
 import random
+import signal
 import tomllib
+import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import redirect_stdout
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from benchmarks.trust.arguments import CALLS, Computed, assert_clear, nothing_co
 from benchmarks.trust.inputs import ready
 from friso.axis import ROTARY, AxisKind
 from friso.errors import InputError, StageError
+from friso.interface.answer import Answer
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
@@ -37,18 +40,38 @@ ASKED = [name for name, sound in CALLS.items() if "stage" in sound and name != "
 """Functions that take a stage."""
 
 
+COMPUTED = 20.0
+"""CPU time [s] for which a function may compute the answer about a drawn stage."""
+
+
 def stages(rng: random.Random, folder: Path) -> None:
-    """Pass a drawn stage to a function, with a range of one of its keys if needed."""
-    stage, name = next(drawn_stages(rng)), rng.choice(ASKED)
+    """Pass a drawn stage to a function, with a range of one of its keys if needed. Nothing is computed."""
+    _ask_about(next(drawn_stages(rng)), rng, folder, nothing_computed())
+
+
+def computed_stages(rng: random.Random, folder: Path) -> None:
+    """Have a function compute its answer about a drawn stage, with warnings as errors, for `COMPUTED` seconds."""
+    _ask_about(next(drawn_stages(rng)), rng, folder, _computed_for(COMPUTED))
+
+
+def _ask_about(stage: Stage, rng: random.Random, folder: Path, within: AbstractContextManager[None]) -> None:
+    """Pass a stage to a function, until `within` raises Computed.
+
+    Raises AssertionError for a traceback, an unclear refusal, or a number that is missing in an answer.
+    """
+    name = rng.choice(ASKED)
     sound = {key: value for key, value in CALLS[name].items() if key != "stage"}
     if "x" in sound:
         sound["x"] = _range_of(stage, rng)
     if name == "rig":
         sound["experiment"] = rng.choice([*RIG_EXPERIMENTS])
     what = f"{name}({sound}) of\n{stage.to_toml()}"
-    with ready(folder), nothing_computed(), redirect_stdout(StringIO()):
+    with ready(folder), redirect_stdout(StringIO()):
         try:
-            getattr(friso, name)(stage=stage, **sound)
+            with within:
+                answer = getattr(friso, name)(stage=stage, **sound)
+                if isinstance(answer, Answer):
+                    _assert_complete(answer)
         except InputError as error:
             assert_clear(what, str(error))
             if isinstance(error, StageError) and error.actual.startswith("nothing"):
@@ -57,6 +80,32 @@ def stages(rng: random.Random, folder: Path) -> None:
             pass
         except Exception as error:
             raise AssertionError(f"{type(error).__name__}: {str(error)[:200]}: {what}") from error
+
+
+@contextmanager
+def _computed_for(seconds: float) -> Iterator[None]:
+    """Raise Computed once the block has used some CPU time [s], and raise every warning as an error."""
+
+    def over(number: int, frame: object) -> None:
+        raise Computed
+
+    before = signal.signal(signal.SIGPROF, over)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            signal.setitimer(signal.ITIMER_PROF, seconds)
+            yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def _assert_complete(answer: Answer) -> None:
+    """Raise AssertionError if the words of an answer lack a number; write its tables and its document."""
+    for sentence in answer.sentences():
+        assert not {"nan", "inf", "None"} & {*sentence.replace(",", " ").split()}, f"a number is missing: {sentence}"
+    list(answer.tables())
+    answer.to_dict()
 
 
 def _range_of(stage: Stage, rng: random.Random) -> str:
