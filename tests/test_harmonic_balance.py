@@ -10,6 +10,7 @@ from refusals import Refused
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
+from friso.errors import InputError
 from friso.frequency.describing import balance
 from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
@@ -194,6 +195,12 @@ def test_receptance_is_that_of_the_closed_loop() -> None:
 
 
 # where it does not
+
+
+def test_a_stage_without_friction_is_refused() -> None:
+    frictionless = stage(HOLD, friction=NO_FRICTION, controller=van_dijk("8 Hz"))
+    with pytest.raises(InputError, match="friction.model"):
+        harmonic_balance(frictionless, [8.0])
 
 
 @pytest.mark.thorough

@@ -8,12 +8,14 @@ from collections.abc import Callable
 from functools import partial
 from itertools import combinations, islice
 
+import numpy as np
 import pytest
 
 import friso
 from benchmarks.trust.stages import drawn_stages
 from friso.app.machine import Machine, machine_on_page
 from friso.design_method.isolator import isolated
+from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.interface.answer import Answer
 from friso.stage import Stage
@@ -89,6 +91,14 @@ def test_what_is_drawn_from_the_schema_is_taken_as_a_whole(caplog: pytest.LogCap
         assert as_built_keys(stage)["drive.sample_time"] > 0
         assert all(isinstance(text, str) for text in (*implausible_values(stage), *idle_encoder(stage)))
         _answered(stage, partial(friso.convert, friction="lugre"))
+
+
+def test_states_have_magnitudes_without_a_gain_on_position() -> None:
+    """The loop's deflection by friction, from which magnitudes follow, is infinite without stiffness."""
+    stage = friso.load(friso.example("thesis_rig")).replace({"controller": {"kind": "pid", "ki": "4 N/(m*s)"}})
+    shape = kernel(structure(stage.flat()))
+    scales = shape.scales(shape.values({**stage.flat(), "motion.size": 0.0}, 1), 1)
+    assert np.all((scales > 0) & np.isfinite(scales))
 
 
 @pytest.mark.thorough

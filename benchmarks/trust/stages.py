@@ -20,6 +20,7 @@ import friso
 from benchmarks.trust.arguments import CALLS, Computed, assert_clear, nothing_computed
 from benchmarks.trust.inputs import ready
 from friso.axis import ROTARY, AxisKind
+from friso.design_method.method import NoDesign
 from friso.errors import InputError, StageError
 from friso.interface.answer import Answer
 from friso.stage import Stage
@@ -76,7 +77,7 @@ def _ask_about(stage: Stage, rng: random.Random, folder: Path, within: AbstractC
             assert_clear(what, str(error))
             if isinstance(error, StageError) and error.actual.startswith("nothing"):
                 raise AssertionError(f"a stage that was taken lacks {error.key}: {what}") from error
-        except Computed:
+        except (Computed, NoDesign):
             pass
         except Exception as error:
             raise AssertionError(f"{type(error).__name__}: {str(error)[:200]}: {what}") from error

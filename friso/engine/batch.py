@@ -110,9 +110,8 @@ def prepare(
 
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         constants = columns(kernel.module.constants(values), runs)
-        scales = columns(kernel.module.scales(values), runs)
         rates = columns(kernel.module.rate(values), runs)[:, 0]
-    scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # without any motion, any tolerance will do
+    scales = kernel.scales(values, runs)
     segments, windows = _segments(flat, runs, options.window)
     windows = np.broadcast_to(windows, (runs,)).copy()
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)

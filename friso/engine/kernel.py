@@ -224,6 +224,13 @@ class Kernel:
             row[:] = flat[name]
         return list(rows)
 
+    def scales(self, values: list[np.ndarray], runs: int) -> np.ndarray:
+        """Return the magnitudes of the states, shape (runs, states); 1 for a state that nothing moves."""
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            scales = columns(self.module.scales(values), runs)
+        scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # any tolerance will do
+        return scales
+
 
 @dataclass(frozen=True)
 class KernelRequest:

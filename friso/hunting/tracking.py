@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import Kernel, columns, kernel
+from friso.engine.kernel import Kernel, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
 from friso.hunting.criteria import BAND, settling_of_traces
@@ -176,7 +176,7 @@ def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) 
     """Return start (1, kept) and multiplier of a periodic response; None if not closed."""
     settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
-    scales = columns(shape.module.scales(values), 1)[0]
+    scales = shape.scales(values, 1)[0]
     size = len(shape.states)
 
     def later(starts: np.ndarray | None, periods: int = 1) -> np.ndarray | None:

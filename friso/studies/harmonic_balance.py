@@ -93,6 +93,10 @@ def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
 
     Raises InputError if a stage has none.
     """
+    if not np.all(stages.length > 0):
+        raise InputError(
+            "friction.model", "no friction to break away from", "a friction law that sticks", 'model = "lugre"'
+        )
     cycles = find_cycles(stages, rtol)
     if cycles.sign >= 0 or not cycles.closed.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"

@@ -63,7 +63,7 @@ class Imposition:
     @cached_property
     def scales(self) -> np.ndarray:
         """Return the magnitudes of the states, shape (count, states)."""
-        return _rows(self.kernel.module.scales(self.values), self.count).T
+        return self.kernel.scales(self.values, self.count)
 
     @cached_property
     def symmetric(self) -> bool:
