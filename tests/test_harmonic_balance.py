@@ -199,7 +199,7 @@ def test_receptance_is_that_of_the_closed_loop() -> None:
 
 def test_a_stage_without_friction_is_refused() -> None:
     frictionless = stage(HOLD, friction=NO_FRICTION, controller=van_dijk("8 Hz"))
-    with pytest.raises(InputError, match="friction.model"):
+    with pytest.raises(InputError, match=r"friction\.model"):
         harmonic_balance(frictionless, [8.0])
 
 
