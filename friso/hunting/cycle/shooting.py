@@ -160,7 +160,11 @@ _S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
-    """Newton's method on several orbits at once; closed and failed orbits are left alone."""
+    """Newton's method on several orbits at once; closed and failed orbits are left alone.
+
+    Where a limiter chatters, every step needs a new Jacobian. There runs are `rough` as long as the gap is wide: their
+    errors are far below it, and they take a quarter of the solver's steps.
+    """
 
     def __init__(
         self,
@@ -190,26 +194,29 @@ class _Shooting:
             tolerances.closed_gap_chattering if self.chatters else tolerances.closed_gap,
             OrbitSettings.current().stalled_steps,
         )
+        self.rough_rtol = max(tolerances.guess_rtol, rtol)
+        self.rough = np.full(count, self.chatters and self.rough_rtol > rtol)
 
     def advance(self) -> bool:
         """Take one step of all active orbits, and tell whether any is still active."""
         renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
-        for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
+        kinds = 2 * self.rough + renewed
+        for which in [np.flatnonzero(self.active & (kinds == kind)) for kind in range(4)]:
             if which.size:
-                self._advance(which, renew=bool(renewed[which[0]]))
+                self._advance(which, bool(renewed[which[0]]), self.rough_rtol if self.rough[which[0]] else self.rtol)
         return bool(self.active.any())
 
-    def _advance(self, which: np.ndarray, renew: bool) -> None:
-        """Take one step of some orbits, with a new Jacobian or with the last one."""
+    def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
+        """Take one step of some orbits, with a new Jacobian or with the last one, from runs at a tolerance."""
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
-            shot = shoot(stages, states, times, self.sign, self.rtol)
+            shot = shoot(stages, states, times, self.sign, rtol)
             ends, fine = shot.ends, shot.done
             for k, jacobian in zip(which, self._jacobians(which, stages, shot), strict=True):
                 self.inverses[k] = _inverse(jacobian)
         else:
-            results = stages.run(states, times, self.rtol)
+            results = stages.run(states, times, rtol)
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
@@ -252,6 +259,15 @@ class _Shooting:
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
+        self._refine(which[self.rough[which]])
+
+    def _refine(self, which: np.ndarray) -> None:
+        """Let fine runs go on where rough ones have nearly closed an orbit."""
+        settings = OrbitSettings.current()
+        near = self.gaps[which] < np.where(self.active[which], settings.rough_gap, settings.rough_stalled_gap)
+        refined = which[near]
+        self.rough[refined], self.active[refined] = False, True
+        self.gaps[refined], self.idle[refined] = np.inf, 0
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
         """Take a Newton step of limited length for one orbit; return the step.
@@ -287,6 +303,7 @@ class _Following(_Shooting):
     def __init__(self, *arguments: Any) -> None:
         tolerances = ToleranceSettings.current()
         super().__init__(*arguments)
+        self.rough[:] = False  # derivatives by place would be those of rough runs' errors
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
