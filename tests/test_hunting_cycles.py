@@ -129,7 +129,7 @@ COMPUTED = [
     pytest.param(4, 2.016549, -0.81745, LOCKED, marks=LOCKED_RIG),
     pytest.param(6, 0.903977, -0.86981, LOCKED, marks=LOCKED_RIG),
     pytest.param(8, 0.520247, -0.93119, LOCKED, marks=LOCKED_RIG),
-    pytest.param(3, 4.286370, -0.83278, free(), marks=FREE_RIG),
+    pytest.param(3, 4.286370, -0.83273, free(), marks=FREE_RIG),
     pytest.param(5, 1.990576, -0.95380, free(), marks=FREE_RIG),
 ]
 
@@ -138,8 +138,11 @@ COMPUTED = [
 def test_cycles_of_the_rig_stay_what_they_were(
     crossover: float, amplitude: float, multiplier: float, joint: str
 ) -> None:
-    """Values hold to the given digits, as when this was written: no reference, but maps and verdicts rest on them."""
-    cycle = only(rig(crossover, joint))
+    """Values hold to the digits written: no reference, but maps and verdicts rest on them.
+
+    At the usual tolerance, 1e-9, the slope where a limiter chatters is off by 8e-5.
+    """
+    cycle = only(rig(crossover, joint), rtol=1e-11)
     assert 1e3 * cycle.amplitude == pytest.approx(amplitude, abs=1e-6)
     assert cycle.multiplier == pytest.approx(multiplier, abs=2e-5)
 
