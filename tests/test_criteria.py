@@ -26,6 +26,7 @@ from friso.hunting.criteria import (
     DISTINCT,
     OUTCOMES,
     SEPARATION,
+    UNDECIDED,
     VERDICTS,
     End,
     counted_peaks,
@@ -56,13 +57,15 @@ def one(end: End, k: int) -> End:
 # ---------------------------------------------------------------- the verdict on a stage
 
 
-@given(st.tuples(*[st.booleans()] * 4))
-def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool]) -> None:
+@given(st.tuples(*[st.booleans()] * 5))
+def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool, bool]) -> None:
     """The table of `friso.hunting.criteria.stage_verdict` is tested entry by entry."""
-    sure, attracts, in_cycle, rests = facts
+    completed, decided, attracts, in_cycle, rests = facts
+    sure = completed and decided
     (word,) = verdicts(*(np.array([flag]) for flag in facts))
     assert word in VERDICTS
-    assert (word == "failed") == (not sure)
+    assert (word == "failed") == (not completed)
+    assert (word in UNDECIDED) == (not sure)
     assert (word in ATTRACTED) == (sure and attracts)
     assert (word == "hunts") == (sure and attracts and in_cycle)
     assert (word == "bistable") == (sure and attracts and not in_cycle)
@@ -70,8 +73,8 @@ def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool]) -> N
     assert (word == "transient") == (sure and not attracts and not rests)
 
 
-@given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=30))
-def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, bool, bool]]) -> None:
+@given(st.lists(st.tuples(*[st.booleans()] * 5), min_size=1, max_size=30))
+def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, bool, bool, bool]]) -> None:
     columns = np.array(several).T
     together = verdicts(*columns)
     assert together.tolist() == [verdicts(*columns[:, [k]])[0] for k in range(len(several))]

@@ -103,12 +103,12 @@ def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
 # what is made of verdicts
 
 
-def made(hunts: int, settles: int, failed: int = 0, unstable: int = 0) -> Fates:
-    words = np.array(["hunts"] * hunts + ["settles"] * settles + ["failed"] * failed, dtype=object)
+def made(hunts: int, settles: int, undecided: int = 0, unstable: int = 0) -> Fates:
+    words = np.array(["hunts"] * hunts + ["settles"] * settles + ["undecided"] * undecided, dtype=object)
     return Fates(words, np.arange(len(words)) < unstable)
 
 
-def test_failures_widen_the_interval() -> None:
+def test_undecided_draws_widen_the_interval() -> None:
     """The interval covers none and all of them hunting (Clopper and Pearson, by the beta distribution)."""
     share = made(30, 60, 10).share(("hunts",))
     assert share.probability == pytest.approx(30 / 90)
@@ -189,7 +189,8 @@ def test_loops_of_draws_are_judged(rig: Stage) -> None:
 def test_document_rows_and_sentences(wording: Wording) -> None:
     shown = draws(made(6, 3, 1))
     document = json.loads(json.dumps(plain_json(draws_document(shown, "given")), allow_nan=False))
-    assert document["verdicts"] == {"hunts": 6, "bistable": 0, "transient": 0, "settles": 3, "failed": 1}
+    verdicts = {"hunts": 6, "bistable": 0, "transient": 0, "settles": 3, "undecided": 1, "failed": 0}
+    assert document["verdicts"] == verdicts
     assert (document["count"], document["seed"], document["left_out"]) == (10, 7, 5)
     assert document["hunts"]["probability"] == pytest.approx(2 / 3)
     assert document["separation"] == {"friction.coulomb": -1.0}
@@ -204,7 +205,9 @@ def test_document_rows_and_sentences(wording: Wording) -> None:
 
 def test_the_figure_holds_every_draw() -> None:
     (panel,) = draws_figure(draws(made(60, 30, 10))).panels
-    assert [band.label for band in panel.bands] == [word for word in VERDICTS if word in ("hunts", "settles", "failed")]
+    assert [band.label for band in panel.bands] == [
+        word for word in VERDICTS if word in ("hunts", "settles", "undecided")
+    ]
     assert panel.bands[-1].high[::2].sum() == 100
     assert panel.x.label == "friction.coulomb [N]"
     assert "settles" in draws_figure(draws(made(0, 30))).panels[0].title

@@ -148,8 +148,8 @@ def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     """Judge stages of one structure, whose own motions are run to a relative tolerance.
 
-    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if a simulation that had to
-    decide failed, or if its attractors are not certain.
+    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion
+    was not simulated to the end. It is "undecided" if its attractors, or the end of its motion, are not certain.
     """
     attracted = find_attractors(flat, count)
     return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
@@ -195,7 +195,7 @@ def judge_runs(
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
         if target is not None:
             decided[free] = rest.steady | _stands(some_of(flat, free), rest)
-    return verdicts(decided, attracts, in_cycle, rests)
+    return verdicts(motions.completed, decided, attracts, in_cycle, rests)
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:

@@ -210,7 +210,7 @@ def _without_a_target(
     elif doubtful and not runs_away and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
         attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
-    word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
+    word = verdicts(motions.completed, motions.completed, rest.steady, rest.steady, rest.rests)[0]
     if attraction.certain and word != "failed":
         tell(word)
     sought, given_up = NOT_SOUGHT, ()
@@ -255,7 +255,7 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > settings.runaway_swing_factor * _widest(attraction):
             doubt = RUNS_AWAY
-        word = verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0]
+        word = verdicts(*np.ones((3, 1), bool), np.array([own.ends]), np.zeros(1, bool))[0]
         if attraction.certain and not doubt:
             tell(word)
         begin(CheckPart.STARTS)

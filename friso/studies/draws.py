@@ -12,7 +12,7 @@ from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
 from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable
-from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -41,7 +41,7 @@ class Fates:
 
     def share(self, words: tuple[str, ...]) -> Share:
         """Return the probability of any of these verdicts."""
-        return share(np.isin(self.verdicts, words), self.verdicts != "failed")
+        return share(np.isin(self.verdicts, words), ~np.isin(self.verdicts, UNDECIDED))
 
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
         """Return how well each key separates hunting stages from others, the most decisive first.
@@ -53,7 +53,7 @@ class Fates:
         from scipy.stats import mannwhitneyu  # 0.7 s to import
 
         attracted = np.isin(self.verdicts, ATTRACTED)
-        others = ~attracted & (self.verdicts != "failed")
+        others = ~np.isin(self.verdicts, ATTRACTED + UNDECIDED)
         if not (attracted.any() and others.any()):
             return {}
         pairs = int(attracted.sum()) * int(others.sum())

@@ -32,7 +32,7 @@ from friso.hunting.criteria.run_outcome import (
     outcomes,
 )
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
-from friso.hunting.criteria.stage_verdict import ATTRACTED, VERDICT_CRITERION, VERDICTS, Verdict, verdicts
+from friso.hunting.criteria.stage_verdict import ATTRACTED, UNDECIDED, VERDICT_CRITERION, VERDICTS, Verdict, verdicts
 
 __all__ = [
     "ATTRACTED",
@@ -51,6 +51,7 @@ __all__ = [
     "RESTS",
     "SEPARATION",
     "SWINGS",
+    "UNDECIDED",
     "VERDICTS",
     "VERDICT_CRITERION",
     "End",

@@ -6,7 +6,8 @@
 | bistable | yes | rests; a kick or another move starts hunting |
 | transient | no | has not come to rest at its end |
 | settles | no | has come to rest |
-| failed | | the run of the motion was not completed, or whether a cycle attracts is unknown |
+| undecided | perhaps | was completed; whether a cycle attracts, or where the motion ends, is not certain |
+| failed | | was not completed |
 | none | unknown | has a reference that keeps moving: of a single stage there is no verdict then |
 
 Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did). What
@@ -20,23 +21,30 @@ from typing import Literal
 
 import numpy as np
 
-Verdict = Literal["hunts", "bistable", "transient", "settles", "failed", "none"]
+Verdict = Literal["hunts", "bistable", "transient", "settles", "undecided", "failed", "none"]
 
-VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "failed")
+VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "undecided", "failed")
 """All verdicts, the worst first."""
 
 ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
 """Verdicts on stages with a stable limit cycle."""
 
+UNDECIDED: tuple[Verdict, ...] = ("undecided", "failed")
+"""Verdicts that leave open whether a stage has a stable limit cycle."""
+
 VERDICT_CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
 
 
-def verdicts(decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
+def verdicts(
+    completed: np.ndarray, decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray
+) -> np.ndarray:
     """Return the verdict on every stage; all arrays have the shape (count,).
 
-    `decided`: the other arguments are known. `attracts`: the stage has a stable limit cycle. `ends_in_cycle`, used
-    where it has one, and `rests`, used where it has none, describe the end of the stage's own motion.
+    `completed`: the run of the stage's own motion. `decided`: the following arguments are certain. `attracts`: the
+    stage has a stable limit cycle. `ends_in_cycle`, used where it has one, and `rests`, used where it has none,
+    describe the end of the stage's own motion.
     """
     hunting = np.where(ends_in_cycle, "hunts", "bistable")
     free = np.where(rests, "settles", "transient")
-    return np.where(decided, np.where(attracts, hunting, free), "failed").astype(object)
+    word = np.where(decided, np.where(attracts, hunting, free), "undecided")
+    return np.where(completed, word, "failed").astype(object)

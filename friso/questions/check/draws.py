@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
 from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
-from friso.shown.drawing.prefixes import NOTHING, percentage, range_with_unit, share_with_interval
+from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
 from friso.studies.settings import StudySettings
 
-COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
+COLOURS = {
+    "hunts": VERMILLION,
+    "bistable": ORANGE,
+    "transient": SKY,
+    "settles": BLUE,
+    "undecided": "#8c6d8f",
+    "failed": GREY,
+}
+
+WHY_OPEN = "what attracts them or how their motion ends is not certain, or a simulation failed"
 
 BINS = 24
 """Number of bars in the histogram."""
@@ -101,22 +110,26 @@ def _narrowed(draws: Draws) -> str:
 def _sentence(name: str, draws: Draws) -> str:
     """Say with which probability a case hunts, how far, and which key matters most."""
     fates = draws.fates[name]
-    failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
+    open_ones = {word: fates.counts[word] for word in UNDECIDED if fates.counts[word]}
+    keys = fates.separations(draws.sample.keys)
     lost = int(np.count_nonzero(fates.unstable))
     sentences = (
         [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction."] if lost else []
     )
     hunting, attracted = (share_with_interval(fates.share(words)) for words in (("hunts",), ATTRACTED))
     none = "none hunts, and none has a cycle that attracts (fewer than {} % of all, with 95 % confidence)"
+    probable = fates.share(ATTRACTED)
     sentences += [
-        f"of {draws.sample.count} draws, hunts with a probability of {hunting}, has a cycle that attracts with "
+        f"what {draws.sample.count} draws do is not certain."
+        if sum(open_ones.values()) == draws.sample.count
+        else f"of {draws.sample.count} draws, hunts with a probability of {hunting}, has a cycle that attracts with "
         f"{attracted}{_swings(fates)}{_edge(draws) if name == 'given' else ''}."
-        if (share := fates.share(ATTRACTED)).probability
-        else f"of {draws.sample.count} draws, {none.format(percentage(share.high))}."
+        if probable.probability
+        else f"of {draws.sample.count} draws, {none.format(percentage(probable.high))}."
     ]
-    if failed:
-        noun, pronoun = ("draw", "it") if failed == 1 else ("draws", "them")
-        sentences.append(f"{failed} {noun} failed; the intervals cover both outcomes for {pronoun}.")
+    if open_ones:
+        counts = listed([f"{count} {'is' if count == 1 else 'are'} {word}" for word, count in open_ones.items()], "and")
+        sentences.append(f"{counts} ({WHY_OPEN}); the intervals cover both outcomes for these.")
     if keys:
         key, separation = next(iter(keys.items()))
         sentences.append(

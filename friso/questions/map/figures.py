@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED, FAILED
+from friso.hunting.criteria import ATTRACTED, UNDECIDED
 from friso.hunting.criteria import VERDICTS as VERDICT_WORDS
 from friso.questions.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
 from friso.questions.map.findings import statement
@@ -116,7 +116,7 @@ def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tupl
     from contourpy import contour_generator
 
     columns, rows = (np.log(axis.positions) if axis.log else axis.positions for axis in (x, y))
-    decided = [k for k, kind in enumerate(colouring.categories) if kind.label in VERDICT_WORDS and kind.label != FAILED]
+    decided = [k for k, kind in enumerate(colouring.categories) if kind.label in {*VERDICT_WORDS} - {*UNDECIDED}]
     cells = np.where(np.isin(codes, decided), np.isin(codes, attracted), np.nan)
     lines: Any = contour_generator(columns, rows, np.ma.masked_invalid(cells)).lines(0.5)
     if not lines:

@@ -96,7 +96,7 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
         texts = part.astype(str)
-        ran = ~np.isin(texts, ["", *_NO_RESULT, "unknown"]) if words else np.isfinite(part)
+        ran = ~np.isin(texts, ["", *_NO_RESULT, "unknown", "undecided"]) if words else np.isfinite(part)
         completed[first : first + rows] = ran
         holds[first : first + rows] = ran & (np.isin(texts, words) if words else part.astype(float) > 0)
     return holds, completed

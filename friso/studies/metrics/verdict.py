@@ -15,11 +15,13 @@ METRIC = Metric(
             "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
         ),
         Word("transient", "orange", "no cycle attracts, but this motion is not at rest by its end"),
+        Word("undecided", "#8c6d8f", "whether a cycle attracts, or where this motion ends, is not certain"),
         Word("settles", "quiet", "no cycle attracts, and this motion comes to rest"),
     ),
     place=71,
     criterion=VERDICT_CRITERION,
     verdict=True,
+    doubt=("undecided", "In {count} of the cells the verdict is not certain."),
     findings=(
         MapFinding("The stage hunts", ("hunts",)),
         MapFinding("It is bistable (a kick or another move can start hunting)", ("bistable",), if_any=True),
