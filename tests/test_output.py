@@ -195,6 +195,19 @@ def test_a_folder_in_which_a_killed_process_was_writing_is_gone_on_with(
     assert len(place(tmp_path / "out").write({"a.txt": "1", "b.txt": "2"})) == 2
 
 
+def test_a_text_that_was_edited_is_not_replaced(tmp_path: Path) -> None:
+    """The stage file that friso identify writes asks to be completed; a second run replaced what was entered."""
+    out = tmp_path / "out"
+    OutputFolder("identify", out, overwrite=False).write({"machine.toml": "a = 1\n", "plot.png": b"1"})
+    OutputFolder("identify", out, overwrite=False).write({"machine.toml": "a = 2\n", "plot.png": b"2"})
+    (out / "machine.toml").write_text("a = 3\n")
+    with pytest.raises(InputError, match=r"machine\.toml was changed"):
+        OutputFolder("identify", out, overwrite=False)
+    assert (out / "machine.toml").read_text() == "a = 3\n"
+    OutputFolder("identify", out, overwrite=True).write({"machine.toml": "a = 4\n", "plot.png": b"4"})
+    OutputFolder("identify", out, overwrite=False)
+
+
 def test_a_file_that_friso_has_not_written_stays(
     tmp_path: Path, refused: Refused, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -11,6 +11,7 @@ import logging
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,6 +63,9 @@ class OutputFolder:
             raise _of_others(folder, maker, f"one that friso {command} made{more}")
         own = [name for name in self.files if self.is_own]
         self.check(own)
+        if edited_texts(folder) and not overwrite:
+            actual = f"{folder}, where {_first_names(edited_texts(folder))} was changed after friso had written it"
+            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(folder))
         for name in own:
             self._check_free(name)
 
@@ -108,20 +112,21 @@ class OutputFolder:
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
         leaving = [name for name in gone if os.path.lexists(self.folder / name)]
         # The marker comes first: if the process is killed, the next run knows which files are its own.
-        write({**self._marker([*names, *leaving]), **contents, **(beside or {})}, own, progress)
+        write({**self._marker([*names, *leaving], {}), **contents, **(beside or {})}, own, progress)
         if self.is_own:
             self.is_marked, self.files = True, tuple(names)
-        if leaving:
-            write(self._marker(names), [self.folder / MARKER])
+        # Digests come last: a killed run must not make the next one take its files for edited ones.
+        texts = {name: digest(content) for name, content in files.items() if isinstance(content, str)}
+        write(self._marker(names, texts), [self.folder / MARKER])
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
         if earlier:
             LOGGER.warning(f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there")
         return written(contents)
 
-    def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
-        """Return the marker file with names of written files, if the folder is the command's own."""
-        return {self.folder / MARKER: marker(self.command, names)} if self.is_own else {}
+    def _marker(self, names: Iterable[str], texts: Mapping[str, str]) -> dict[Path, Content]:
+        """Return the marker file, if the folder is the command's own; see `marker`."""
+        return {self.folder / MARKER: marker(self.command, names, texts)} if self.is_own else {}
 
 
 def refuse_place(option: str, path: Path) -> None:
@@ -246,9 +251,18 @@ def _are_one(path: Path, other: Path) -> bool:
     return path.exists() and other.exists() and path.samefile(other)
 
 
-def marker(command: str, names: Iterable[str]) -> str:
-    """Return the text of the marker file: the command, and the files that it wrote."""
+def digest(text: str) -> str:
+    """Return the SHA-256 of a text."""
+    return sha256(text.encode()).hexdigest()
+
+
+def marker(command: str, names: Iterable[str], texts: Mapping[str, str]) -> str:
+    """Return the text of the marker file: the command, and the files that it wrote.
+
+    `texts` are the digests of those that a user may edit.
+    """
     lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
+    lines += ["", "[texts]", *(f"{as_toml(name)} = {as_toml(sum_)}" for name, sum_ in texts.items())]
     return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
 
 
@@ -267,6 +281,16 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     if not (isinstance(command, str) and isinstance(files, list)):
         return "", ()
     return command, tuple(str(name) for name in files)
+
+
+def edited_texts(folder: Path) -> list[str]:
+    """Return the names of texts in a folder that were changed after friso had written them."""
+    try:
+        texts = parsed(text_of(folder / MARKER, "a marker"), "a marker").get("texts", {})
+    except InputError:
+        return []
+    present = [name for name in texts if (folder / name).is_file()] if isinstance(texts, dict) else []
+    return [name for name in present if sha256((folder / name).read_bytes()).hexdigest() != texts[name]]
 
 
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:

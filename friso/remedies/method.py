@@ -92,7 +92,7 @@ class Advice:
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """Return the smallest change that works (see `ChangeSize`), or None."""
+        """Return the smallest change that works (see `ChangeSize`), for all moves if there is one; or None."""
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:
@@ -118,12 +118,16 @@ class Advice:
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """Return the remedies that work, the smallest change first.
+        """Return the remedies that work: those for all moves first, and of these the smallest change first.
 
         Leaf springs follow the remedy whose joint they make.
         """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
-        return tuple(sorted(works, key=self.size))
+        return tuple(sorted(works, key=lambda outcome: (not self.for_all_moves(outcome), self.size(outcome))))
+
+    def for_all_moves(self, outcome: RemedyOutcome) -> bool:
+        """Tell whether the goal holds with a remedy for all moves that were drawn."""
+        return outcome.measured is not None and outcome.measured.holds_for_all_moves(self.goal)
 
     @property
     def recommended(self) -> tuple[RemedyOutcome, ...]:

@@ -120,6 +120,11 @@ class Performance:
         high = self.moves_drawn.largest if last == order.size - 1 else self.sizes[order[last]]
         return float(low), float(high)
 
+    def holds_for_all_moves(self, goal: Goal) -> bool:
+        """Tell whether the goal holds from the smallest to the largest of the moves that were drawn."""
+        moves = self.moves_drawn
+        return moves is None or self.held_moves(goal) == (moves.smallest, moves.largest)
+
     def _all_meeting(self, goal: Goal) -> np.ndarray:
         """Return which machines meet the whole goal, the further ones last."""
         return np.append(self._meets_all(goal), self.further)

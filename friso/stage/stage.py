@@ -1,7 +1,7 @@
 """Define the stage: all tables together, and the flat SI mapping that the equations read."""
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
@@ -372,7 +372,7 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
             try:
                 replaced = Stage(**tables)
             except StageError as other:
-                raise error if other.key == CONTROLLER else other from None
+                raise error if other.key == CONTROLLER else _of_another_form(other, changes, others) from None
             LOGGER.warning(f"[controller] is of another form now: {', '.join(others)} are gone")
             return replaced
         begun = [key for key in changes if key.startswith(f"{name}.")]
@@ -381,6 +381,22 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
         actual = f"set for a stage that has no [{name}]"
         expected = f"a stage with [{name}], or all of its keys; {error.key}: {error.expected}"
         raise StageError(begun[0], actual, expected, error.example) from None
+
+
+def _of_another_form(error: StageError, changes: Mapping[str, Any], others: Sequence[str]) -> StageError:
+    """Return the error for changes to a form of controller of which the tables lack some keys.
+
+    `others` are the keys of the form in the tables. Other errors are returned unchanged.
+    """
+    if not error.actual.startswith("nothing"):
+        return error
+    key = next(key for key in changes if key.startswith(f"{CONTROLLER}."))
+    missing = ", ".join([error.key, *error.actual.partition("missing: ")[2].split(", ")]).rstrip(", ")
+    expected = (
+        f"its other keys, too ({missing}); or speed instead, an axis of friso map and friso boundary that scales any "
+        "controller"
+    )
+    return StageError(key, f"a key of another form than yours ({', '.join(others)})", expected, 'speed="0.25..4"')
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.quantities import percent
 from friso.remedies.method import Advice
 from friso.shown.drawing.prefixes import listed, with_unit
@@ -44,6 +47,8 @@ def _missed(name: str, tuning: Advice) -> str:
     moving = np.all([met for part, met in meets.items() if part != "hunting"], axis=0)
     if name == "hunting":
         return f"{percent(float(np.mean(~every[moving])))} of the machines that meet the rest hunt or may hunt"
+    if name == "bandwidth" and math.isfinite(own := loop_bandwidth(tuning.stage)):
+        return f"its bandwidth, {with_unit(own, 'Hz')}, is above your limit"
     if name not in meets and name != "together":
         return DOUBTS[name]
     missing = percent(float(np.mean(~meets.get(name, every))))

@@ -166,7 +166,9 @@ def _least_words(tuning: Advice) -> str:
     if not tuning.interrupted:
         given_up = any(outcome.certainty == "given up" for outcome in sought)
         smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
-        return f"The least change that works{smaller}"
+        every = tuning.least is not None and tuning.for_all_moves(tuning.least)
+        moves = " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
+        return f"The least change that works{moves}{smaller}"
     if tuning.least_sought or any(not outcome.interrupted for outcome in sought):
         return "The least change so far that works"
     return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
@@ -323,7 +325,9 @@ def held_range(measured: Performance, goal: Goal) -> str:
 def _holds(measured: Performance, goal: Goal) -> str:
     """Say for which moves the goal holds."""
     moves = held_range(measured, goal)
-    return "for no range of moves" if moves == NOTHING else f"which holds for moves of {moves}"
+    if moves == NOTHING:
+        return "for no range of moves"
+    return f"which holds for moves of {moves}{'' if measured.holds_for_all_moves(goal) else ' alone'}"
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
@@ -550,6 +554,8 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
         "does not work": "no",
     }
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
+    if "bandwidth" in tuning.unmet:
+        table[0][1][1] = NOTHING  # no machine meets a limit that its controller breaks
     for outcome in tuning.outcomes:
         works = words.get(verdict := _verdict(outcome, tuning), verdict)
         cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
