@@ -28,8 +28,8 @@ WITHOUT_CONTROLLER = (
 
 OUT_OF_STEP = (
     "with the controller of the stage file the simulated machine gets out of step with the log, which was therefore "
-    "fitted along its position; if the machine does not hunt, its controller is another: check the gains and the mass "
-    "it is tuned for"
+    "fitted along its position; if the machine does not hunt, its controller may be another (check the gains and the "
+    "mass it is tuned for), or noise of its encoder moves it, which is not simulated"
 )
 
 

@@ -14,7 +14,8 @@ from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figur
 if TYPE_CHECKING:
     from friso.hunting import Cycle, Hunting
 
-_VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle or repeated swing
+_VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle
+_LEAST_RETURN = 1e-4  # least swing past the target that is drawn, relative to the swing before
 _STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed
 _BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
 _APART = 0.01  # smallest difference of cart and stage that is drawn, relative to the amplitude
@@ -37,7 +38,8 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
             " A stage on a free joint turns farther out than the point where its cart sticks, slightly off the curve."
         )
     hunting = [(item.label, item.case.judgement.hunting) for item in cases]
-    caption += "".join(f" {label}: no cycle, as {search.reason}." for label, search in hunting if search.reason)
+    without = [(label, search.reason) for label, search in hunting if search.reason and not search.cycles]
+    caption += "".join(f" {label}: no cycle, as {reason}." for label, reason in without)
     uneven = [label for label, search in hunting if search.attracting and not _mirrored(search)]
     caption += "".join(
         f" {label}: nothing is shaded, as swings to one side differ from those to the other." for label in uneven
@@ -51,15 +53,18 @@ def _return_map(item: ShownCase) -> list[Panel]:
     It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
     """
     hunting = item.case.judgement.hunting
-    if hunting.returns is None or not np.any(hunting.returns.returns > 0):
+    if hunting.returns is None:
         return []
     distances, returns = hunting.returns.distances[0], hunting.returns.returns[0]
-    largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(np.minimum(distances, returns)))
+    beyond = returns > _LEAST_RETURN * distances
+    if not beyond.any():
+        return []
+    largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(distances[beyond]) / _VIEW)
     reach = _VIEW * float(largest)
     swings = np.repeat(_swings(item), 2)
     series = [
         Series(np.array([0.0, reach]), np.array([0.0, reach]), "", GREY, "dashed"),
-        Series(distances, np.where(returns > 0, returns, np.nan), "next swing", item.colour, width=2.2),
+        Series(distances, np.where(beyond, returns, np.nan), "next swing", item.colour, width=2.2),
     ]
     if swings.size > 2:
         series.append(Series(swings[1:-1], swings[2:], "this motion", INK, width=0.8))

@@ -157,7 +157,7 @@ def _bistable(case: Case) -> str:
         keys = listed([key.partition(".")[2].replace("_", " ") for key in moves.ranges], "and")
         like = f"this move at {least:g} to {most:g} times its {keys}"
         starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
-    first = f"settles after this move{_stuck(case)}"
+    first = f"settles after this move{_later(case)}{_stuck(case)}"
     if not starts and CheckPart.STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if case.judgement.hunting.passing:
@@ -240,6 +240,13 @@ def _settling(case: Case) -> str:
     hunting = case.judgement.hunting
     says = _settling_sentence(case)
     return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
+
+
+def _later(case: Case) -> str:
+    """Say that a motion which still swings at the end of its run comes to rest later."""
+    if case.settling_time.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON:
+        return ""
+    return f" (later than in its run of {with_unit(case.stage.flat()['motion.duration'], 's')})"
 
 
 def _stuck(case: Case) -> str:

@@ -83,6 +83,7 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
     """Draw the record as measured and simulated over time."""
     if moves.loop is not None:
         caption = "The identified machine in closed loop on the logged reference; the measured motion does not enter."
+        caption += "" if moves.fit.problem.closed else " Its values were fitted along the logged position instead."
         panels = record_panels(moves.log, moves.part, moves.simulated)
         return Figure(f"{name}_traces", "Measured and simulated", caption, panels)
     time, force = moves.log.time[moves.part], moves.log["force"][moves.part]
