@@ -1,6 +1,6 @@
 """Draw a linear analysis: plant, open loop, Nyquist plot and sensitivity.
 
-Each figure shows the limit cases, and some show the whole family of states behind them.
+Each figure shows the limit cases. Some also show the family: the loop in many states of friction, stuck and sliding.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def first_figures(bode: Bode) -> tuple[Figure, ...]:
 
 
 def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
-    """Name the stage in figures, and leave out figures without panels."""
+    """Write the stage's name on each figure, and drop figures without panels."""
     return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
@@ -194,7 +194,7 @@ def _speeds(bode: Bode) -> Figure:
 
 
 def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
-    """Return the curve of a loop, dashed and labelled if the loop is unstable."""
+    """Return the curve of a loop; if the loop is not `stable`, dash it and say so in its label."""
     return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
 
 
@@ -224,7 +224,10 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Return evenly picked stable or unstable members of the family, where they are in view."""
+    """Return Nyquist curves of some stable or unstable members of the family, evenly picked.
+
+    Only the parts near -1 are kept. The first curve is called `name` in the legend; all have the colour `shade`.
+    """
     numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
@@ -278,7 +281,7 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
 
 
 def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
-    """Return the panel of a measure of size, such as [dB], over frequencies (k,) [Hz]."""
+    """Return the panel of what `of` computes from responses, such as dB, over frequencies [Hz]."""
     lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
     return Panel("", Axis.of_frequency(hertz), axis, tuple(lines))
 

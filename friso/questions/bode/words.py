@@ -127,7 +127,7 @@ def _crossing(bode: Bode) -> bool:
 
 
 def _subject(bode: Bode) -> str:
-    """Say in which measure the bandwidth is given."""
+    """Say in what the bandwidth is given: in crossovers, or multiples of the present bandwidth."""
     return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
 
 
@@ -202,7 +202,11 @@ def _limits(bode: Bode, name: str) -> str:
 
 
 def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
-    """Name the state that limits a range of crossovers, or the state for which there is no range."""
+    """Name in brackets the state that is unstable first, or closest to -1, as bandwidth rises.
+
+    `member` is this state (None: nothing is said), and `meaning` says which of both it is. `end` is the bandwidth above
+    which that holds; without one, it holds for the stage as given.
+    """
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"

@@ -40,7 +40,7 @@ def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
 
 
 def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
-    """Return a special point of a branch: its value, kind, error, and the cycle there."""
+    """Return a special point of a branch, such as a fold: its value, kind, error, and cycle."""
     return {
         "value": key.number(line.at[k, 0]),
         "kind": line.kinds[k],

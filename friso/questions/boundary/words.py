@@ -87,7 +87,7 @@ class ShownKey:
         return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
-        """Write the lowest and highest of some values [SI] that lie in a range."""
+        """Write the lowest and highest of some values [SI], cut to the range `swept`."""
         low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
         return self._with_unit(f"{low:.6g} to {high:.6g}")
 
@@ -150,7 +150,7 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
-    """Describe an edge of hunting that runs across the whole plane.
+    """Describe an edge of hunting that runs across the whole plane of two keys.
 
     The sentence gives the values of one key at both ends of the other, and the farthest values in between.
     """
@@ -158,12 +158,12 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     side, other = ("below", "above") if edge.below else ("above", "below")
 
     def ends(k: int) -> str:
-        """Write the value or range of values at which hunting ends, at a place across."""
+        """Write the value of one key at which hunting ends, or a range, at point `k` along the edge."""
         low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
         return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
 
     def at(k: int) -> str:
-        """Write the value of the other key at a place across."""
+        """Write the value of the other key at point `k` along the edge."""
         return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
@@ -320,7 +320,7 @@ def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
 
 
 def end_sentence(traced: Diagram, key: ShownKey) -> str:
-    """Give the verdicts at both ends of the range."""
+    """Give the verdicts at both ends of the key's range."""
     swept = traced.space.ranges[0]
     first, last = end_verdicts(traced)
     return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
@@ -357,13 +357,13 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say where a change was found but no curve could be started."""
+    """Say near which points hunting changes although no curve could be followed from there."""
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
 def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Write a place in the plane as values of both keys."""
+    """Write a point in the plane of two keys, given by its `values` [SI]."""
     return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
 
 

@@ -74,9 +74,10 @@ def _mirrored(hunting: Hunting) -> bool:
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
-    """Return strips over the distances up to `reach` [m] from which hunting goes on for ever.
+    """Return strips of distances, up to `reach` [m], from which a stage ends in hunting.
 
-    The return map is followed from swing to swing. The stage has to be its own mirror image.
+    The return map leads from the `distances` at which the stage sticks to its `returns` [m] on the other side. It is
+    followed over many swings, and must be the same on both sides.
     """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts

@@ -1,4 +1,4 @@
-"""Show what stages drawn from an uncertain one do: in the table, in sentences and in a figure."""
+"""Show what machines drawn from uncertain keys do: in the table, sentences and a figure."""
 
 from __future__ import annotations
 
@@ -80,9 +80,9 @@ def _edge(draws: Draws) -> str:
 
 
 def _narrowed(draws: Draws) -> str:
-    """Say which measurement would narrow the ranges most; "" where it is not known.
+    """Say which key should be measured to narrow the ranges most; "" if this is not known.
 
-    The measurement is of the key with which amplitudes correlate most.
+    It is the key with which the amplitudes of hunting correlate most.
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))

@@ -98,9 +98,9 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Draw the deviation after the move with its counted peaks (thesis, Fig.
+    """Draw the deviation after the move with its counted peaks, and the settling.
 
-    5), and the settling.
+    It is Fig. 5 of the thesis.
     """
     start, end = _window(cases)
     lines, peaks = [], []

@@ -48,9 +48,9 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
-    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds the fates of stages
-    drawn from uncertain keys, or None; `cut` tells that Ctrl-C left some undrawn. `laws` holds the verdicts across
-    friction laws, or None.
+    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds what machines do that
+    were drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some of them undrawn. `laws` holds the
+    verdicts under all friction laws, or None.
     """
 
     stage: Stage
@@ -125,7 +125,10 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """Say what the search for the edge may miss; add the joint's margins and passivity doubts."""
+        """Return what the search for the edge may miss, margins of the joint, and a doubt on friction.
+
+        The doubt is that a friction law may give energy back, which no friction does.
+        """
         from friso.questions.check.margin_words import joint_sentences
         from friso.questions.check.words import between_surveyed
         from friso.questions.convert.words import activity_sentences
@@ -143,10 +146,7 @@ class CheckAnswer(Answer):
 
     @cached_property
     def joint_margins(self) -> Mapping[str, ParameterMargin]:
-        """Return the margins in the joint's stroke and stiffness by key.
-
-        They belong to the case with a free joint.
-        """
+        """Return the margins in the joint's stroke and stiffness by key, with the joint free."""
         from friso.hunting import joint_margins
 
         case = self.result.get("free", self.result["given"])
@@ -229,7 +229,7 @@ def checked_stage(
     laws: bool = False,
     progress: Progress = silent,
 ) -> CheckAnswer:
-    """Answer the question of a stage whose uncertain keys have these correlations.
+    """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
     Raises InputError for a number of draws that is not usable.
     """
@@ -273,7 +273,7 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return a case whose verdict is not certain where only the drive makes the loop unstable."""
+    """Return a case; its verdict is not certain if the drive alone makes the loop unstable."""
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")

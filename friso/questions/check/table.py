@@ -46,7 +46,7 @@ def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
-    """Turn a function that describes a cycle into one that describes a case's cycle."""
+    """Return a function of a case from a function `text` that describes a cycle."""
 
     def of_the_case(case: Case) -> str:
         """Write the text about the cycle of a case, or that there is none."""
@@ -74,7 +74,7 @@ def _decided(cycle: Cycle) -> str:
 
 
 def _further_cycles(case: Case) -> str:
-    """List the cycles beside the one that decides the verdict."""
+    """List the cycles of a case, except the one that decides the verdict."""
     judgement = case.judgement
     return (
         "; ".join(_further_cycle(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle)
@@ -173,7 +173,7 @@ def _peaks(case: Case) -> str:
 
 
 def _settled_within(band: float) -> Callable[[Case], str]:
-    """Build the text of the settling time into a band [m]."""
+    """Return a function that writes a case's settling time into a band [m]."""
 
     def text(case: Case) -> str:
         """Write the settling time of a case, or why there is none."""
@@ -190,7 +190,10 @@ def _settled_within(band: float) -> Callable[[Case], str]:
 
 
 def _tracked(size: Callable[[Tracking], float]) -> Callable[[Case], str]:
-    """Build the text of an error of a case whose reference keeps moving."""
+    """Return a function that writes how well a case follows a reference that keeps moving.
+
+    `size` picks the error [m].
+    """
     return lambda case: with_unit(size(case.tracking), "m") if case.tracking else NOTHING
 
 

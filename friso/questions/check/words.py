@@ -354,9 +354,9 @@ def _present_bandwidth(case: Case) -> float | None:
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
-    """Write a bandwidth that is a multiple of the case's own.
+    """Write a bandwidth that is `factor` times the case's own.
 
-    It is rounded upward, downward or, with None, to the nearest number.
+    It is rounded upward or downward to some digits, or to the nearest number with `up` = None.
     """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
@@ -369,7 +369,7 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key of a bandwidth [Hz] at which the loop does not cross 0 dB; None otherwise."""
+    """Return the key that sets the bandwidth if it is not a crossover; None if it is one."""
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
@@ -469,15 +469,20 @@ def _with_other_friction(case: Case) -> str:
 
 
 def _distance(case: Case, edge: Margin) -> float:
-    """Return the distance from the edge that advice keeps, as a factor.
+    """Return by which factor the bandwidth advised lies above the edge of hunting.
 
-    The factor is 1 if something attracts again within that distance, over a range wide or close enough to matter.
+    The factor is 1 if hunting returns within that distance, over a range wide or close enough to matter, or beyond the
+    bandwidths searched.
     """
     distance = SEARCH_LIMITS.edge_distance
     to = edge.quiet * distance
 
     def in_the_way(window: BandwidthWindow) -> bool:
-        """Tell whether a window attracts again between the edge and the bandwidth advised."""
+        """Tell whether the stage hunts again between the edge and the bandwidth advised.
+
+        `window` is a range of bandwidths in which it hunts. A narrow range well below the bandwidth advised does not
+        count.
+        """
         low, high = window.low, window.high
         if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
             return False

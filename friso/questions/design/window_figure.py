@@ -75,7 +75,7 @@ def _named_once(bands: list[Band]) -> tuple[Band, ...]:
 
 
 def _corners(rows: list[tuple[int, Corners]], visible: Range) -> Markers:
-    """Return marks at the edge of hunting of each corner in view."""
+    """Return marks at the edges of hunting in view, one for each corner of friction and masses."""
     edges_of_rows = [
         (row, corners.edges[(corners.edges > visible[0]) & (corners.edges < visible[1])]) for row, corners in rows
     ]

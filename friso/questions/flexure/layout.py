@@ -104,7 +104,7 @@ class PaperDrawing:
         return (low - left, high + right), self._upwards(row, 2), self._upwards(across, 1)
 
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
-        """Return the extent of a view along its upward axis.
+        """Return how far a view reaches along its upward axis, below and above its origin [mm].
 
         It holds `half` to both sides, the marked points, and a part of the block.
         """

@@ -46,15 +46,15 @@ def name_of(key: str) -> str:
 
 
 def within(key: str) -> str:
-    """Write the name of a key inside a sentence; proper names keep their capitals."""
+    """Write the name of a key as inside a sentence; proper names keep their capitals."""
     name = name_of(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
 
 def unit_of(unit: str) -> str:
-    """Write a unit in the form that prefixes know: "N s/m" becomes "N*s/m".
+    """Write a unit so that prefixes can be added to it: "N s/m" becomes "N*s/m".
 
-    Ones are left out: "1 s^2/1" becomes "s^2".
+    Factors of 1 are left out: "1 s^2/1" becomes "s^2".
     """
     top, *below = unit.split("/")
     factors = [part for part in top.replace("*", " ").split() if part != "1"]
@@ -110,7 +110,7 @@ def digits(value: float, unit: str) -> str:
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
-    """Return factor and prefixed unit that suit the value.
+    """Return the factor and the prefixed unit in which to write a value.
 
     Without a value, they suit the range that is possible.
     """

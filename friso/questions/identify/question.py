@@ -250,7 +250,7 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys that a stage file lacks and a stage `made` up around a log supplies.
+    """List the keys of tables that a stage file lacks, as filled in by a stage `made` from logs.
 
     Keys that the user sets are left out.
     """
@@ -260,7 +260,7 @@ def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """Say which tables of keys were made up around a log."""
+    """Say which tables the stage file lacks, and that a log or assumed values fill them."""
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))

@@ -1,4 +1,7 @@
-"""Draw a frequency response: Bode plot with fits, noise and distortion, and low-end friction."""
+"""Draw a frequency response: Bode plot with fits, noise and distortion.
+
+Further figures show the response where it departs from the linear model, and friction there.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +105,7 @@ def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
 
 
 def _unit(response: FrequencyResponse, power: str = "") -> str:
-    """Return the unit of a response, its output divided by a power of time."""
+    """Return the unit of a response: output per input, times `power`, such as "/s^2"."""
     return unit_of(f"{response.channels.output_unit}{power}/{response.channels.input_unit}")
 
 

@@ -124,14 +124,14 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate shows no effect: its interval contains 0."""
+    """Tell whether an estimate of bias or of viscous asymmetry may be zero."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show the quantities that are not identified.
 
-    A kind that was `done` is left out; the reasons say what its logs lacked.
+    A kind in `done` is left out: why its logs were not enough is said elsewhere.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
@@ -209,10 +209,7 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """Say how much of logs with gaps is used.
-
-    The analysis takes the longest stretch without a gap.
-    """
+    """Return a row on the samples used, if logs have gaps: those of the longest stretch without."""
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
         return ()

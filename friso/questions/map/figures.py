@@ -146,7 +146,10 @@ def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tup
 
 
 def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
-    """Return panels over two axes for values of the further ones, and which values are left out."""
+    """Draw a map of three or more axes as panels over two axes, at some values of the others.
+
+    The text says which of these values have no panel.
+    """
     x, y, *further = plane_first(axes)
     picked = pick([len(axis.places) for axis in further], SLICES)
     panels = []
@@ -204,7 +207,10 @@ def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> P
 
 
 def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
-    """Return words over a single axis as a row of points for each word."""
+    """Draw a map with a single axis: one row of points for each word, such as "hunts".
+
+    `codes` holds the index of each cell's word, and `occurring` the indices of the words that occur.
+    """
     names = tuple(colouring.categories[i].label for i in occurring)
     markers = tuple(
         Markers(
@@ -222,7 +228,7 @@ def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int])
 def _samples(
     axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
 ) -> tuple[list[Panel], str]:
-    """Return samples over the first two of their keys, and which other keys were sampled."""
+    """Draw samples over the first two of their keys, and name the other keys that were sampled."""
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes

@@ -50,7 +50,7 @@ BYTES = 8
 
 @dataclass(frozen=True)
 class Varied:
-    """The options on which keys are varied and how, as the user gave them."""
+    """What the user asked to vary: axes, links between keys, and how to sample them."""
 
     axes: Mapping[str, AxisValues] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
@@ -175,9 +175,9 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
 
 
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
-    """Return the runs of all cells that were not inferred, for the page to draw.
+    """Simulate the runs of all cells, for the page to draw.
 
-    Returns None for more than DRAWN cells.
+    Cells whose result was inferred from neighbours have none. Returns None for more than DRAWN cells.
     """
     from friso.studies.traces import traces
 
@@ -277,7 +277,7 @@ def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
 
 
 def _noted_digests(store: Path) -> dict[str, list[object]]:
-    """Return the digests that a store notes, by file name; they may be of other files."""
+    """Return the digests that a store has noted, by file name; other files may be among them."""
     from friso.studies.metadata import checked_metadata
 
     try:

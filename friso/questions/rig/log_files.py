@@ -36,10 +36,7 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """Return the keys of joint and controller that a log set otherwise than the stage file.
-
-    Values are texts with units.
-    """
+    """Return the keys of joint and controller that were changed for a log, as texts with units."""
     before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text

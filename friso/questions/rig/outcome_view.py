@@ -17,9 +17,10 @@ from friso.studies.rig.outcome import Outcome
 
 @dataclass(frozen=True)
 class OutcomeView:
-    """The view of an experiment's outcome.
+    """How to show the outcome of one of the rig's experiments.
 
-    Fields are functions for sentences, for figures arranged as in the thesis, and for numbers of the JSON document.
+    Each field is a function of the outcome: sentences, figures arranged as in the thesis, and numbers of the JSON
+    document.
     """
 
     sentences: Callable[[Outcome], list[str]]

@@ -21,8 +21,8 @@ def conclusion(
 ) -> str:
     """Say what the run of a stage does.
 
-    `moves_on` tells that the reference moves at the end, and `evenly` that its velocity is then constant. `deviation`
-    has evenly timed samples of the deviation from the reference [m], shape (n,).
+    `moves_on` is true if the reference moves at the end, and `evenly` if its velocity is then constant. `deviation` has
+    evenly timed samples of the deviation from the reference [m], shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))

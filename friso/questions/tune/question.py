@@ -67,7 +67,7 @@ class TuneAnswer(Answer):
         return self.result.interrupted
 
     def details(self) -> Sequence[str]:
-        """Return gains for drives, windows of the numbers, what matters most, and assumptions."""
+        """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
         from friso.questions.tune.gain_words import gain_lines
         from friso.questions.tune.sensitivity_words import sensitivity_sentences
         from friso.questions.tune.words import assumptions, window_lines

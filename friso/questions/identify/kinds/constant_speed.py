@@ -60,7 +60,7 @@ def _direction_text(direction: Direction) -> str:
 
 
 def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
-    """Return friction over speed and over place, for the document."""
+    """Return friction over speed and over position on the rail, for the document."""
     sides = {**result.velocity.directions, "both": result.velocity.both}
     passes = [
         {
@@ -133,7 +133,7 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
 
 
 def _position(friction: FrictionPosition, name: str) -> list[Figure]:
-    """Draw the force over the place, pass by pass."""
+    """Draw the friction force over the position on the rail, pass by pass."""
     if not friction.passes:
         return []
     colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))
