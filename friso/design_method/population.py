@@ -18,7 +18,7 @@ from friso.intervals import Interval
 
 @dataclass(frozen=True)
 class Population:
-    """Machines as flat keys with SI arrays (count,), for the keys that differ from the stage."""
+    """Machines as arrays of shape (count,) by key [SI], for keys that differ from the stage."""
 
     keys: Mapping[str, np.ndarray]
     count: int
@@ -96,9 +96,9 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
-    """Return moves there and back at fractions, from 0 to 1, of travel and acceleration.
+    """Return keys of moves there and back, at fractions from 0 to 1 of the ranges specified.
 
-    The fractions are those of the ranges.
+    `travel` and `acceleration` are these fractions, on a logarithmic scale.
     """
     settings = DesignSettings.current()
     distance, rate = (
@@ -138,7 +138,7 @@ def _masses(spec: Spec) -> dict[str, Interval]:
 def _population(
     ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
 ) -> Population:
-    """Return machines at fractions, from 0 to 1, of the ranges.
+    """Return machines whose keys lie at fractions `shares`, from 0 to 1, of their ranges.
 
     Sliding friction is limited to the static friction. Machines with both equal are included, although they cannot
     hunt.

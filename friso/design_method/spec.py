@@ -35,9 +35,9 @@ from friso.stage.section import Section, Table
 
 @dataclass(frozen=True)
 class OneOrMany:
-    """A key that takes one item or a list of items.
+    """A key of the specification that takes one item or a list of items.
 
-    `read_one` reads each item, and raises SpecError.
+    `of` reads each item; None stands for names of materials. Raises SpecError for an item that is not usable.
     """
 
     of: Quantity | Number | None

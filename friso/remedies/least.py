@@ -45,7 +45,7 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """Return a key that varies between two values, and slightly beyond if a stage allows it."""
+    """Return a key as a variable between two values, and slightly beyond if a stage allows it."""
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
@@ -81,7 +81,7 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield changes of a single variable that work, the smallest first, all smaller than `most`.
 
-    They break no constraint, a fraction `enough` of the fresh machines meets the goal, and no machine hunts. With
+    They break no constraint, the fraction `enough` of the fresh machines meets the goal, and no machine hunts. With
     `enough`, values between grid points are not tried, so the first answer has a reserve.
     """
     settings = RemedySettings.current()
@@ -108,8 +108,8 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield the points (points, variables) that work on fresh machines, of which none hunts.
 
-    A fraction `enough` of the machines must meet the goal by moves and margins; by default, the least fraction that
-    certainly meets the goal.
+    At least the fraction `enough` of these machines must meet the goal by moves and margins. By default, it is the
+    fraction that also makes it likely for all machines.
     """
     settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough
@@ -119,9 +119,9 @@ def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> 
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
-    """Return the sizes of changes at points, shape (points,).
+    """Return the sizes of the changes at points with coordinates `shares`, shape (points,).
 
-    The integer part counts the keys that change; the fraction grows with the factor.
+    The integer part counts the keys that change; the fraction grows with the factors of change.
     """
     logarithms = np.stack(
         [
@@ -133,18 +133,18 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
-    """Return the size of a change as a number.
+    """Return the size of a change as a number, to compare changes.
 
-    Its integer part is the number of keys; its fraction grows with the logarithm of the whole factor.
+    Its integer part is the number of keys; its fraction grows with the `logarithm` of the product of all factors.
     """
     return np.asarray(keys + logarithm / (1 + logarithm))
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """Return points from which a search starts, shape (points, variables).
+    """Return points from which a search starts, as coordinates of shape (points, variables).
 
-    The working settings come first. Then follow settings with some keys restored to the present value, wholly or
-    half-way in the logarithm, the fewest changed keys first.
+    The working settings come first. Then follow settings in which only some keys change, the fewest first. Changes are
+    taken wholly, and half-way in the logarithm.
     """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
@@ -153,7 +153,7 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Return the coordinates of present and working numbers, from 0 to 1, (variables, 2)."""
+    """Return coordinates of each variable's present and working value, shape (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 

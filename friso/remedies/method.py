@@ -57,11 +57,11 @@ room for a second one from leaf springs; an extra package is missing; or no usua
 class Advice:
     """Results of all remedies for a stage, in the order of the catalogue.
 
-    `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
-    misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
-    margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal to relax
-    if nothing works, and `relaxed_all` whether all of these were tried. `interrupted` tells whether the search was
-    ended early, and `least_sought` whether the smallest change was searched before that.
+    `case` is the check of the stage, and `present` its performance on machines. `unmet` are the parts of the goal that
+    it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits` gives the bandwidths with
+    enough margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal
+    to relax if nothing works; `relaxed_all` is true if all of these were tried. `interrupted` is true if the search was
+    ended early, and `least_sought` if the smallest change was searched before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -139,12 +139,15 @@ class Advice:
 
     @property
     def fastest(self) -> RemedyOutcome | None:
-        """Return the working remedy with the shortest settling time."""
+        """Return the working remedy with the shortest settling time, or None."""
         return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
-    """Return the time [s] in which 95 % settle with a remedy; infinite if not measured."""
+    """Return the time [s] in which enough machines and moves settle with a remedy.
+
+    Enough is the fraction `goal.share`. The time is infinite if they never do, or if the remedy was not measured.
+    """
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
@@ -257,7 +260,7 @@ def tune(
 
 
 def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int, moves: MoveRange | None = None) -> Fleet:
-    """Draw machines around a stage, without the stage file's own machine."""
+    """Draw machines around a stage, of which none is the stage file's own."""
     return draw_fleet(stage, correlations, count + 1, seed, moves).take(np.arange(1, count + 1))
 
 
@@ -284,11 +287,12 @@ def machines_of_search(
 
 @dataclass
 class _Session:
-    """A session that tries all remedies of a stage in turn, with the `outcomes` so far.
+    """Search for remedies of one stage: what was tried, how it ended, and what is next.
 
-    `searching` is the current search, and `searches` has all searches by remedy. `least_factor` tells that the smallest
-    bandwidth that works is searched, and `is_least` that it was found. All remedies together may take the work
-    `allowed`.
+    `outcomes` are the results so far, `searching` is the current search, and `searches` has all searches by remedy.
+    While `least_factor` is true, the smallest bandwidth that works is searched; `is_least` is true if it was found.
+    `allowed` limits the work of all remedies together. Settings are searched on `machines`, and verified on `unseen`
+    ones, then on `further` ones if the result is unclear.
     """
 
     stage: Stage
@@ -315,9 +319,10 @@ class _Session:
         return any(outcome.certainty == "works" for outcome in self.outcomes)
 
     def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
-        """Find the smallest factor on the bandwidth that works, as a first answer.
+        """Search the smallest factor on the bandwidth that works, as a first answer.
 
-        If there is none, or there are no `others` to improve on it, the factor that settles soonest is searched.
+        If there is none, or no `others` follow that may be smaller changes, the factor that settles soonest is
+        searched.
         """
         search = self._begun(remedy, self.budget.machines)
 
@@ -358,7 +363,10 @@ class _Session:
                 self.tries(remedy)
 
     def _combines(self, remedy: Remedy) -> bool:
-        """Tell whether a remedy combines the variables of several others, each of which works alone."""
+        """Tell whether a remedy only combines others that work alone.
+
+        Its variables are then those of at least two of them together.
+        """
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
         alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
@@ -430,7 +438,7 @@ class _Session:
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
         """Search for the smallest change of the keys that a working remedy changes.
 
-        Returns whether the remedy changes any key that can be searched.
+        Returns False if none of these keys can be searched.
         """
         settings = RemedySettings.current()
         assert outcome.stage is not None
@@ -449,7 +457,7 @@ class _Session:
         return True
 
     def tries_large_moves(self) -> None:
-        """Verify the settings that serve large moves only, the one for the smallest moves first.
+        """Verify settings that serve large moves only, first those that begin at the smallest move.
 
         If an allowance of work is used up, the others are left out.
         """
@@ -474,7 +482,7 @@ class _Session:
                 self.outcomes[place] = outcome
 
     def interrupted(self) -> None:
-        """Record the best point so far of the current remedy, without verification."""
+        """Record the best point so far of the current remedy, which is not verified."""
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
@@ -483,7 +491,7 @@ class _Session:
         return change_size(self.stage, outcome.stage)
 
     def _begun(self, remedy: Remedy, machines: int) -> Search:
-        """Start the search for a remedy on some of the machines."""
+        """Start the search for a remedy on the first `machines` of those drawn for searches."""
         self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
@@ -493,9 +501,10 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Record the outcome of the first verified one of a few points, or else of the first.
+        """Verify points of a search in turn until one works, and record its outcome.
 
-        A point that is not verified is not sure to work.
+        If none does, the first outcome is recorded, which is not sure to work. Few points are tried, and the work is
+        limited.
         """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
@@ -524,7 +533,7 @@ class _Session:
     def makes_leaves(self) -> None:
         """Size and verify leaf springs for the joints of remedies that are described in full.
 
-        Their search is over, so its work does not limit this.
+        The work allowed for searches does not limit this.
         """
         working = (one for one in self.outcomes if one.certainty == "works" and not one.remedy.makes)
         for one in _recommended(sorted(working, key=self._size), self.goal):
@@ -566,7 +575,7 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """Return the settings against friction closest to the goal, combined with the bandwidth.
+    """Return the settings against friction closest to the goal, each with a varied bandwidth.
 
     They are tried only if no change of the controller alone works.
     """
@@ -580,7 +589,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
-    """Return the best point so far of an interrupted search, without verification."""
+    """Return the outcome of an interrupted search: its best point so far, which is not verified."""
     if not search.tried:
         return outcome
     points = search.points
@@ -614,9 +623,9 @@ def _generations(budget: Budget) -> int:
 
 
 class _Report:
-    """Progress over all remedies, in steps.
+    """Report progress over all remedies, in steps.
 
-    A remedy that takes more steps than planned waits at the last of them.
+    A remedy that takes more steps than planned stays at the last of them.
     """
 
     def __init__(self, progress: Progress, total: int) -> None:

@@ -1,7 +1,7 @@
 """Search the best points of one remedy, and survey whether the machines hunt there.
 
-The search is differential evolution (Storn and Price 1997, doi:10.1023/A:1008202821328), as in SciPy. Whole generations
-are simulated at once in the engine's lanes.
+A point is one value for each variable of the remedy. The search is differential evolution (Storn and Price 1997,
+doi:10.1023/A:1008202821328), as in SciPy. Whole generations of points are simulated at once.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Budget:
     """Sizes of a search: points, generations and machines.
 
     `points` counts the points of a generation for each variable. `refined` further generations search around the best
-    points. `machines` make the moves of the search and `surveyed` are surveyed for hunting; both are fewer than the
-    `fresh` machines on which an answer is measured. `further` machines are added if these leave the answer open.
+    points. `machines` make the moves of the search, and `surveyed` of them are surveyed for hunting. An answer is
+    measured on `fresh` machines, which are more. `further` machines are added if these leave the answer open.
     """
 
     points: int = 10
@@ -75,11 +75,11 @@ class TriedPoints:
         return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
-        """Return the points with these numbers."""
+        """Return the points with these indices."""
         return TriedPoints(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
-        """Return for each constraint of the goal which points break it."""
+        """Return for each part of the goal, by name, which points break it."""
         return {
             "bandwidth": np.isfinite(_most(goal.bandwidth_limit)) & ~(self.bandwidth <= _most(goal.bandwidth_limit)),
             "margin": self.margin < goal.margin,
@@ -94,7 +94,7 @@ class TriedPoints:
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
-        """Return the numbers of points that serve only the larger moves, up to `largest` [m].
+        """Return the indices of points that serve only the larger moves, up to `largest` [m].
 
         They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
         """
@@ -106,7 +106,7 @@ class TriedPoints:
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
         """Return the cost of points: the settling time, or the quantity `wanted` if given.
 
-        For points that break constraints, the cost is the amount by which they do.
+        Points that break constraints cost more than all others, the more they break them.
         """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
@@ -125,7 +125,7 @@ def _most(limit: float | None) -> float:
 
 @np.errstate(over="ignore")  # forces that are not finite are excluded elsewhere
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
-    """Return by which fraction values exceed a limit."""
+    """Return by which fraction values exceed a limit; 0 if they do not."""
     return np.maximum(0, values / _most(limit) - 1)
 
 
@@ -134,7 +134,7 @@ class Search:
     """Search for the best points of a remedy on `machines`.
 
     Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
-    surveyed points at which machines hunt, or may hunt. `cut` tells that the search took too much work.
+    surveyed points at which machines hunt, or may hunt. `cut` is true if the search took too much work.
     """
 
     remedy: Remedy
@@ -183,7 +183,10 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield points (variables,) for inspection, until the next takes too much work (`cut`)."""
+        """Yield points (variables,) for closer study, until finding one takes too much work.
+
+        The search is then marked as `cut`.
+        """
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -262,9 +265,9 @@ class Search:
         return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
-        """Return the places between grid points where a variable reaches the bandwidth limit.
+        """Return coordinates between grid points at which a variable reaches the bandwidth limit.
 
-        The limit is reached from below.
+        The bandwidth rises through the limit there.
         """
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
@@ -286,14 +289,14 @@ class Search:
     def measured(
         self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
     ) -> TriedPoints:
-        """Measure points on the machines.
+        """Simulate moves at points on the machines, and return how the machines performed.
 
-        Moves are simulated only if the loop is stable with half of the required margin, and a remedy of several
-        variables does not exceed the bandwidth limit by far: other moves chatter and take most of the work.
+        Moves are simulated only if the loop is stable with half of the margin required. A remedy of several variables
+        must also not exceed the bandwidth limit by far. Other moves chatter and take most of the work.
 
         A point is nearer to settling the more machines settle within the tolerance, the looser one, and the tolerance
-        at the lower bandwidth, so that progress shows before any machine is in position. A point is stopped as soon as
-        it must cost more than `most`. The machines that are slowest most often are tried first.
+        at the lower bandwidth. So progress shows before any machine is in position. A point is stopped as soon as it
+        must cost more than `most`. The machines that are slowest most often are tried first.
         """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
@@ -342,9 +345,9 @@ class Search:
         return so_far()
 
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-        """Return the points that break no constraint on any machine, the best first.
+        """Return the points of a batch that break no constraint on any machine, the best first.
 
-        See `surveyed`.
+        The best settle soonest, or have the least `wanted`.
         """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
@@ -384,8 +387,8 @@ class Search:
 
         Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
         meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
-        farther away, because the best points are often at the limit of what works. If there are none, the point that
-        serves most fresh machines is yielded.
+        farther away, because the best points are often at the limit of what works. If no point has enough fresh
+        machines, the one with the most is yielded.
         """
         settings = RemedySettings.current()
         points = self.begun
@@ -459,9 +462,10 @@ class Search:
 
 
 def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the smallest move from which all machines settle, (points,).
+    """Return the smallest move [m] from which all larger ones settle too, shape (points,).
 
-    Moves have shape (points, machines). It is infinite where the machine with the largest move does not settle.
+    `settles` has shape (points, machines), and `sizes` [m] are the machines' moves. The result is infinite if the
+    largest move does not settle.
     """
     order = np.argsort(-sizes, kind="stable")
     count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
@@ -474,14 +478,14 @@ def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | Non
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell which points (points, variables) equal which of the others, (points, others)."""
+    """Tell for each point which of the others is equal to it, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the distance of points from the nearest other, (points,).
+    """Return the distance of points from the nearest of the others, shape (points,).
 
-    Points have shape (points, variables). The distance is infinite without others.
+    It is the largest difference of a coordinate; infinite without others.
     """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
@@ -529,7 +533,7 @@ def _evolve(
 
 
 def _agree(intermediate_result: Any) -> bool:
-    """Tell whether the points of a generation break no constraint and are equally good.
+    """Tell whether SciPy's search may stop: all points meet the constraints and are as good.
 
     Points that break constraints may all be equally bad; the search must then go on.
     """
@@ -539,7 +543,7 @@ def _agree(intermediate_result: Any) -> bool:
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """Return the first points, at most `most`, each at least `apart` from those before."""
+    """Return the first points, at most `most`, each more than `apart` from all others returned."""
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

@@ -54,7 +54,7 @@ TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmissio
 
 @dataclass(frozen=True)
 class EdgeDerivatives:
-    """Edge of hunting as a bandwidth [Hz], and its derivatives by keys [per SI unit], (keys,).
+    """The edge of hunting as a bandwidth [Hz], and its derivatives `by` keys [Hz/SI], (keys,).
 
     For a controller that states no bandwidth, the edge is a multiple of the present speed.
     """
@@ -193,7 +193,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Return the stage with equations that contain all given keys.
+    """Return a stage's flat keys, changed so little that its equations contain all given `keys`.
 
     An exponent that is a whole number, for example, would otherwise be built in as a constant. Raises InputError for a
     key that equations never contain.
@@ -210,7 +210,10 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """Return the derivatives of the edge; without `edge`, a check finds the edge first."""
+    """Return the derivatives of the edge; without `edge`, a check finds the edge first.
+
+    Returns None if there is no certain edge, or none that can be differentiated.
+    """
     edge = check_given(stage).judgement.margin if edge is None else edge
     moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
     if edge is None or moved is None:

@@ -26,8 +26,8 @@ DAMPING = (0.05, DAMPING_RATIOS[1])
 class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` tells that the stage hunts neither at its bandwidth nor down to the distance below it. `margin` is the
-    least modulus margin of all settled states. If no joint settles, this is the last one tried.
+    `settles` is true if the stage hunts neither at its bandwidth nor below it, down to the distance that advice keeps.
+    `margin` is the least modulus margin of all settled states. If no joint settles, this is the last one tried.
     """
 
     stage: Stage

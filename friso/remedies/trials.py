@@ -1,4 +1,4 @@
-"""Try points on machines, all machines at once in the engine's lanes."""
+"""Try points of a search, one value for each variable, on many machines at once."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """Return the settling time [s] that a fraction `share` of machines keeps, (points,)."""
+        """Return the time [s] within which a fraction `share` of machines settles, shape (points,)."""
         return quantile(self.settling, share)
 
 
 def quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """Return for each row the least value that a fraction `share` of the row does not exceed."""
+    """Return for each row its least value that is not below a fraction `share` of the row."""
     ordered = np.sort(values, axis=-1)
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 
@@ -99,10 +99,10 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """Result of a survey for hunting of machines, with arrays of shape (points, machines).
+    """Which machines hunt at which points, as arrays of shape (points, machines).
 
-    `attracts` tells whether a machine hunts at its bandwidth or down to the distance below it. `decided` tells whether
-    simulations decided that, and `certain` whether in addition no other attractor can exist.
+    `attracts` is true if a machine hunts at its bandwidth, or at one lower by up to the goal's distance. `decided` is
+    true if the simulations sufficed to say so, and `certain` if in addition no other attractor can exist.
     """
 
     attracts: np.ndarray
@@ -111,11 +111,11 @@ class Attraction:
 
     @classmethod
     def none(cls, machines: int) -> Attraction:
-        """Return one point at which none of `machines` machines hunts."""
+        """Return the result for one point at which none of so many `machines` hunts, for certain."""
         return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
 
     def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
-        """Return a copy in which the numbered machines have another result."""
+        """Return a copy in which the `machines` with these indices have the results of `other`."""
         columns = {name: column.copy() for name, column in vars(self).items()}
         for name, column in columns.items():
             column[:, machines] = getattr(other, name)

@@ -54,13 +54,13 @@ def of_key(key: str, low: float, high: float, present: float = float("nan")) -> 
 
 
 def bandwidth_factor(present: float = float("nan")) -> Variable:
-    """Return the speed of the whole controller as a variable, in units of the present speed."""
+    """Return the bandwidth of the whole controller as a variable: a factor on the present one."""
     settings = RemedySettings.current()
     return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
-    """Return the ratios of a controller's gains, then its bandwidth, as variables."""
+    """Return as variables the numbers that shape the controller, then its bandwidth."""
     settings = RemedySettings.current()
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
@@ -70,7 +70,10 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:
-    """Return stroke, stiffness and damping of an isolator for the least static friction [N]."""
+    """Return stroke, stiffness and damping of an isolator as variables.
+
+    Their ranges follow from the least static `friction` [N].
+    """
 
     settings = RemedySettings.current()
 
