@@ -84,7 +84,7 @@ class RemedySettings(Settings):
     """Machines that show the usual modulus margin. Fewer leave its second digit uncertain."""
 
     far_margin_share: float = setting(0.5, "")
-    """Fraction of the usual margin below which a machine is left out of the small sample in which settings are tried."""
+    """Fraction of the usual margin below which a machine is left out of the few on which settings are tried."""
 
     few_share: float = setting(0.2, "")
     """Fraction, of the machines that may miss the goal, whose margins lie below what is usual."""

@@ -119,7 +119,7 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _space(space: ClaimInSpace) -> dict[str, Any]:
-    """Return the result on a claim over the joint draws."""
+    """Return in how many draws of the values that the thesis leaves open a claim holds, and why."""
     return {
         "draws": space.draws,
         "undecided": space.undecided,

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class ReproduceAnswer(Answer):
     """The thesis recomputed.
 
-    `result` is a `Reproduction` with maps, responses and a verdict on each claim. `laws`, if requested, tells how the
-    conclusions are judged under each friction law.
+    `result` is a `Reproduction` with maps, responses and a verdict on each claim. `laws` are judgements of the
+    conclusions under each friction law, or None.
     """
 
     laws: ConclusionsByLaw | None
@@ -85,7 +85,7 @@ class ReproduceAnswer(Answer):
 
 
 def _drawn(space: dict[str, Any] | None) -> str:
-    """Say in how many joint draws a claim holds; "" without draws."""
+    """Say in how many draws of the values left open a claim holds; "" without draws."""
     return f"[{space['holds']} of {space['draws']} draws] " if space else ""
 
 

@@ -60,7 +60,7 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say in how many draws a claim holds, with the interval of the fraction."""
+    """Say in how many draws of the values left open a claim holds, with the fraction's interval."""
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -69,7 +69,7 @@ def share(verdict: ClaimVerdict) -> str:
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
-    """Say in how many draws one of several criteria is met.
+    """Say in how many draws of the values left open one of several criteria is met.
 
     The text is empty for a claim with one criterion, whose fraction is stated with the claim.
     """
@@ -80,7 +80,7 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return the word of agreement by what attracts the stages; "" if that does not matter."""
+    """Return the word of agreement if attractors judge the claim; "" if that does not matter."""
     return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
 
 
@@ -116,7 +116,7 @@ def _first_sentence(text: str) -> str:
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """Return the texts below an item, by name.
+    """Return the texts below a figure or section, by name.
 
     They are numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance
     changes.
@@ -167,9 +167,9 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Say which draw, or friso's own choice, fits the printed numbers best.
+    """Say which draw of the values left open fits the numbers printed in the thesis best.
 
-    Also say which numbers these are.
+    friso's own choice counts as a draw. The sentence also says which numbers these are.
     """
     fit = plausible.fit
     if fit is None:

@@ -112,7 +112,7 @@ class IsolatorNeed:
 class Worked:
     """The rig as a worked example of the guideline.
 
-    - `rates` [Hz], by name; `machines`, by law and by computation.
+    - `rates`: frequencies [Hz] that enter the laws, by name; `machines`: edges by law and by computation.
     - `friction`: edges of the rigid rig over the friction range.
     - `bound` [Hz]: highest edge by the law over all friction forces, with the rig's bristles and masses and the gaps
       swept.

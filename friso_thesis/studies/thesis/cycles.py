@@ -75,9 +75,9 @@ class CyclesOnMap:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """Evenly spread cells of a map.
+    """Evenly spread cells of a map, and whether anything attracts the stage of each.
 
-    For each it is stored whether anything attracts its stage, and whether that is certain, in the shape of the runs.
+    `attracts` says so, and `decided` whether that is certain, in the shape of the `runs`.
     """
 
     runs: xr.Dataset
@@ -85,7 +85,7 @@ class Surveyed:
     decided: np.ndarray
 
     def attracted(self, edges: Sequence[Edge]) -> xr.Dataset:
-        """Return the runs with attraction as criterion, and distances from the edges of attraction."""
+        """Return the runs judged by what attracts, with distances of cells from the `edges`."""
         return by_attraction(by_peak_count(self.runs), self.attracts, self.decided, cells_apart(self.runs, edges))
 
 
@@ -169,9 +169,9 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
-    """Return the curves over a map.
+    """Return the curves over a map on which cycles stop attracting.
 
-    There are none if the axes belong to the motion, which plays no part.
+    There are none if the axes belong to the motion, which does not affect them.
     """
     if study.of_motion:
         return ()

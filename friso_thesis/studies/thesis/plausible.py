@@ -1,7 +1,7 @@
-"""Judge the claims over joint draws of the values that the thesis does not state.
+"""Judge the claims for random choices of the values that the thesis does not state.
 
-The module finds in how many draws each claim holds, on which values that depends, and which draw fits the printed
-numbers best.
+Such a choice of all values is a joint draw. The module finds in how many draws each claim holds, on which values that
+depends, and which draw fits the printed numbers best.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ PARTS = {**NEEDS, **EXPERIMENTS}
 class Separation:
     """How well a value separates the draws in which a claim holds from the others.
 
-    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if the claim holds at all the
-    larger values. `probability` is that of such a correlation by chance.
+    The `correlation` is the rank-biserial one (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if the claim holds at all the
+    larger values. `chance` is the probability of such a correlation by chance.
     """
 
     value: str
@@ -60,7 +60,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """A part of a claim over draws: number of draws in which it is `met`, and fraction."""
+    """In how many draws of the open values a part of a claim is `met`, and in which fraction."""
 
     met: int
     share: Share
@@ -105,7 +105,7 @@ class ClaimInSpace:
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that the thesis prints for a claim, its criterion, and its value in a draw."""
+    """A number that the thesis prints for a claim, its criterion, and what friso finds for it."""
 
     claim: str
     criterion: str
@@ -192,12 +192,12 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
-    """Return the finding of a judge by the thesis's count."""
+    """Return the finding of a judge, with hunting judged by the thesis's peak count."""
     return entry.judge(by_way(base, by_peak_count))
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """Judge the claims in one draw.
+    """Judge the claims in one draw of the open values, and return the findings by claim.
 
     A claim that cannot be computed there gets the reason.
     """
@@ -251,7 +251,7 @@ def _met(column: Sequence[bool | None], count: int) -> MetPart:
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """Return the fraction of `count` draws.
+    """Return the fraction of true flags among `count` draws, with its interval.
 
     Draws without a flag count as undecided.
     """

@@ -215,9 +215,9 @@ def _by_attraction(
 
 
 def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[str, Finding]:
-    """Return the findings by other readings of the thesis's `words`.
+    """Return the findings by other meanings of the thesis's `words`, such as “about”.
 
-    Only words by which the claim is judged are read otherwise. The result is by the change of reading.
+    Only words by which the claim is judged are read otherwise. The result is by the change of meaning.
     """
     findings = {}
     for name, other in others_of(words).items():
@@ -248,7 +248,7 @@ def _others(
 
 
 def _second(runs: xr.Dataset) -> xr.Dataset:
-    """Return every second value of each axis; for fewer than five values, all."""
+    """Return the runs at every second value of each axis; an axis of fewer than five keeps all."""
     return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
 
 

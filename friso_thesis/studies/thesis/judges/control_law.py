@@ -143,7 +143,10 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
 
 @judges("S421", figure="Sec. 4.2.1, motor constant")
 def motor_constant_cancels(evidence: Evidence) -> Finding:
-    """Judge the loop with a stronger or weaker motor, tuned for the mass that it shows."""
+    """Judge whether a wrong motor constant leaves the open loop unchanged.
+
+    The controller is tuned for the mass that such a motor appears to move.
+    """
     flat = evidence.rig.flat()
     omega = 2 * np.pi * np.geomspace(0.1, 1e3, 100)
     own = loops(flat, member(1.0), omega)

@@ -107,9 +107,10 @@ def pushed_at_the_centre(evidence: Evidence) -> Finding:
 
 
 def judged_place(stiffness: np.ndarray, length: float) -> Finding:
-    """Judge the place from the stage's stiffness (6, 6) at the ends of leaves of a length [m].
+    """Judge at which place a force does not tilt the stage, from its stiffness matrix (6, 6).
 
-    A force F along z that acts at a distance d from the leaf ends exerts the moment -d F about y.
+    The stiffness is taken at the ends of leaves of a length [m]. A force F along z that acts at a distance d from the
+    leaf ends exerts the moment -d F about y.
     """
     words = reading()
     compliance = np.linalg.inv(stiffness)

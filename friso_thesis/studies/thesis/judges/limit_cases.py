@@ -57,7 +57,7 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
 
 
 def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
-    """Judge the parasitic mode, and the pair of frequencies above it if the limiter is touched."""
+    """Judge the parasitic mode, and the two modes above it if the limiter is touched."""
     words = reading()
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}

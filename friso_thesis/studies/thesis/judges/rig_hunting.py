@@ -38,7 +38,10 @@ def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
 
 
 def _beside(counted: tuple[int, int], threshold: float) -> str:
-    """Return that a fraction of rails is undecided if its interval holds the threshold, else ""."""
+    """Say that a count of rails is too near a `threshold` to decide; "" if it decides.
+
+    It is too near if the interval of the fraction holds the threshold.
+    """
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""
 
@@ -276,7 +279,7 @@ def _sized(peaks: tuple[float, float]) -> bool:
 
 
 def _over_noise(standstill: InPosition) -> str:
-    """Say at which force noises the deviations are as measured."""
+    """Say with which noises of the force the deviations at standstill are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:

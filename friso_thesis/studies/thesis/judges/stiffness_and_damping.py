@@ -125,9 +125,9 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
 
 
 def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
-    """Say where runs keep moving in a stripe of their own.
+    """Say at which longer strokes runs keep moving again, if they do: a stripe of its own.
 
-    Its strokes are longer than some at which all runs come to rest. `moving` has the shape (strokes, dampings).
+    At some shorter strokes all these runs come to rest. `moving` has the shape (strokes, dampings).
     """
     rests = np.maximum.accumulate(~moving, axis=0)  # the first stroke at which they come to rest
     apart = moving & rests
