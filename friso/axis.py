@@ -103,7 +103,7 @@ KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
 
 
 def axis_of(flat: Mapping[str, Any]) -> AxisKind:
-    """Return the kind of axis of a stage given as flat keys."""
+    """Return the kind of axis of a stage, from its keys."""
     return KINDS[flat.get(AXIS_KIND, LINEAR.name)]
 
 

@@ -50,7 +50,7 @@ class Geometry:
 
     @classmethod
     def of_stage(cls, flat: Mapping[str, Any]) -> Geometry:
-        """Read the geometry of a stage with [flexure], given as its flat keys [SI]."""
+        """Read the geometry of a stage with [flexure] from its keys in SI."""
         bought = (flat[f"flexure.{name}"] for name in ("leaves", "thickness", "material"))
         return cls.of(np.array([flat[f"flexure.{name}"] for name in SIZES]), Sheet(*bought))
 

@@ -346,7 +346,7 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     """Return the highest crossover [Hz] that a front of leaf springs allows.
 
-    It is the highest frequency of a first interfering mode on the front, over a factor of safety.
+    It is the highest frequency on the front of a first mode that interferes with control, over a factor of safety.
     """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
@@ -354,7 +354,7 @@ def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Choose the softest leaves for the highest crossover that leaves and margins allow.
 
-    Raises NoDesign.
+    The two are adapted to each other in rounds. Raises NoDesign if none of the `candidates` fits.
     """
     settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))

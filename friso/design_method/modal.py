@@ -41,7 +41,7 @@ class Modal:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
-        """Build the states of a stage, given as flat keys, with the modes of its leaf springs."""
+        """Build the states of a stage, given by its keys in SI, with the modes of its leaf springs."""
         rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
         members, drive = settled_members(rigid), DriveTiming.of(rigid)
         omega = _frequencies(rigid, leaves, drive)

@@ -24,7 +24,10 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys with each machine's values; the controller stays unchanged."""
+        """Return the stage's keys, with each machine's values where machines differ from it.
+
+        The controller stays unchanged.
+        """
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:

@@ -71,12 +71,12 @@ class Requirement:
 
 
 def more(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that relaxes a requirement when it becomes larger."""
+    """Return a key that must become larger to relax a requirement, by the factor it is broken."""
     return RelaxableKey(key, value, unit, lambda excess: value * excess)
 
 
 def less(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that relaxes a requirement when it becomes smaller."""
+    """Return a key that must become smaller to relax a requirement, by the factor it is broken."""
     return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 

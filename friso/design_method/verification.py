@@ -141,10 +141,9 @@ def move_machines(
     label: str = "moves",
     patient: bool = True,
 ) -> MachineOutcomes:
-    """Simulate the moves of stages given as flat keys, arrays of shape (count,).
+    """Simulate the moves of `count` stages, given by keys with arrays of shape (count,).
 
-    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window
-    [m].
+    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window [m].
     """
     settings = DesignSettings.current()
     first = _followed_moves(flat, count, window, settings.followed_time, progress, label)

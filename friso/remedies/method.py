@@ -178,6 +178,7 @@ def tune(
 ) -> Advice:
     """Optimise and verify every remedy that the goal allows, or the remedies named in `chosen`.
 
+    Machines are drawn with the `seed` and the `correlations` of uncertain keys. `budget` sets the size of the searches.
     `begins` is called before the work starts, and `answered` with the outcome of the first remedy. Raises InputError
     for a motion after which nothing has to settle.
     """

@@ -25,7 +25,8 @@ from friso.stage import Stage
 class RelaxedGoal:
     """A goal relaxed in up to three parts, and a `remedy` that meets it.
 
-    It has the stage, the relaxed parts, and the product of the factors by which they are relaxed.
+    `stage` is that of the remedy, and `relaxations` are the parts. `factor` is the product of the factors by which they
+    are relaxed.
     """
 
     remedy: Remedy

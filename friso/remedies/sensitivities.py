@@ -227,10 +227,10 @@ def _of_edge(
 
 @np.errstate(all="ignore")
 def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
-    """Return the derivatives of the time at which the stage last enters the band `within` [m].
+    """Return the derivatives of the settling time into the band `within` [m], by the keys.
 
-    A derivative is the change of position there over the speed of entry. Returns None if neighbouring motions do not
-    follow.
+    A derivative is the change of position where the stage last enters the band, over its speed there. Returns None if
+    the time is not smooth, since neighbouring motions do not follow.
     """
     if not rests(flat):
         return None

@@ -56,9 +56,10 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """Simulate the moves of points (points, variables), from 0 to 1 over a remedy's ranges.
+    """Simulate the moves of machines at points of a search, with all settings of each point.
 
-    The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
+    `shares`, (points, variables), are coordinates from 0 to 1 over the remedy's ranges. The bandwidth is lower by the
+    factor `slower`. `rtol` is the solver's relative tolerance.
     """
     settings = RemedySettings.current()
     count = len(shares) * machines.count
@@ -77,7 +78,7 @@ def moves_of_points(
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Return sampling, delay and current loop of a stage as flat keys."""
+    """Return sampling, delay and current loop of a stage, as numbers in SI by key."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 
@@ -85,10 +86,11 @@ def timing(drive: Stage) -> dict[str, float]:
 def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
-    """Return the limit cases' least modulus margin, (points, machines); 0 if unstable.
+    """Return the least modulus margin of the limit cases, (points, machines); 0 if unstable.
 
-    Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by the factor `slower`.
-    Controllers with other gains at standstill get the smaller margin of both sets.
+    `shares` are the points of a search, as coordinates. Sampling and delay are taken from the stage `drive`, and the
+    bandwidth is lowered by the factor `slower`. Controllers with other gains at standstill get the smaller margin of
+    both sets.
     """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
@@ -141,12 +143,12 @@ def attraction(
     enough: float | None = None,
     at_once: bool = False,
 ) -> Attraction:
-    """Survey whether the machines hunt at points.
+    """Survey whether machines hunt at points of a search, given by coordinates `shares`.
 
     Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance. The lowest
     bandwidth comes first, because most machines hunt there; or all come `at_once`, which is faster if hardly any
-    machine hunts. An undecided bandwidth ends the survey of a machine, and a point with fewer than the fraction
-    `enough` of quiet machines ends with it. Simulations start from many states; closed orbits confirm the final answer.
+    machine hunts. An undecided bandwidth ends the survey of a machine. A point ends with fewer than the fraction
+    `enough` of quiet machines. Simulations start from many states; closed orbits confirm the final answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

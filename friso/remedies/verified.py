@@ -171,7 +171,10 @@ class Performance:
         return replace(self, moves=moves, margin=margin, attraction=attracted, sizes=sizes)
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-        """Return the performance with further machines measured."""
+        """Return the performance with `further` machines added.
+
+        Of these, only whether they meet the goal is kept.
+        """
         moved = replace(self, **_measured(stage, machines, goal, drive))
         meets = moved._surveyed(stage, machines, np.arange(machines.count), goal, at_once=True)._meets_all(goal)
         sizes = np.append(self.sizes, machines.sizes)

@@ -215,7 +215,7 @@ def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Memb
 
 
 def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
-    """Write ranges of the bandwidth in words; say so if there is none."""
+    """Write ranges of the bandwidth in words; without any, say in which range none was found."""
     unit = _unit(bode)
     windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
     return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"

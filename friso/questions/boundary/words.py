@@ -185,7 +185,7 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where a curve runs, and how it ends there."""
+    """Say from where to where the curve with this index runs, and how it ends there."""
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
@@ -256,7 +256,8 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
     """Say between which of the values tried a cycle attracts as well.
 
-    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order.
+    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
+    errors [SI].
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]

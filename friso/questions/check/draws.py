@@ -22,7 +22,7 @@ MOST_LISTED = 4
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table of draws, with one text per case."""
+    """Return the table's rows on machines drawn from uncertain keys, with one text per case."""
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
         ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
@@ -43,7 +43,7 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 
 
 def draws_sentences(draws: Draws) -> list[str]:
-    """Say what the draws do, in one sentence per case, and which draws were left out."""
+    """Say what the machines drawn do, in one sentence per case, and which were left out."""
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
     cases = case_labels(draws.stage).items()
@@ -57,7 +57,7 @@ def draws_sentences(draws: Draws) -> list[str]:
 
 
 def _swings(fates: Fates) -> str:
-    """Write the ranges of amplitude and period with which draws hunt; "" if none does."""
+    """Write the ranges of amplitude and period of the machines that hunt; "" if none does."""
     amplitudes, periods = (values[np.isfinite(values)] for values in (fates.amplitudes, fates.periods))
     if not amplitudes.size:
         return ""
@@ -69,7 +69,7 @@ def _swings(fates: Fates) -> str:
 
 
 def _edge(draws: Draws) -> str:
-    """Write between which bandwidths the draws' edges of hunting lie; "" if not known."""
+    """Write in which range of bandwidths hunting of the machines drawn ends; "" if not known."""
     drawn_edges = draws.edges
     if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
         return ""
@@ -126,7 +126,7 @@ def _sentence(name: str, draws: Draws) -> str:
 
 
 def draws_figure(draws: Draws) -> Figure:
-    """Draw the verdicts as stacked bars over the most influential key, case by case."""
+    """Draw stacked bars of the verdicts on machines over the most influential key, case by case."""
     panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
         f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
@@ -136,7 +136,10 @@ def draws_figure(draws: Draws) -> Figure:
 
 
 def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
-    """Return the stacked bars of one case over the key that best separates its verdicts."""
+    """Draw stacked bars of a case's verdicts over the key that best separates them.
+
+    The key is one of the uncertain keys from which machines were drawn.
+    """
     keys = draws.sample.keys
     key = next(iter(fates.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)

@@ -261,7 +261,7 @@ def _friction(with_trace: list[ShownCase]) -> Figure:
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
-    """Return a panel of lines; a line that hardly moves beside the others becomes a point."""
+    """Return a panel of lines; a line much shorter than the others becomes a point."""
     spans = [_span(line.x) for line in lines]
     rest = [span <= 0.01 * max(spans) for span in spans]
     points = [

@@ -60,7 +60,7 @@ class CheckAnswer(Answer):
 
     @property
     def interrupted(self) -> bool:
-        """Tell whether Ctrl-C ended the draws."""
+        """Tell whether Ctrl-C ended the work before all machines were drawn."""
         return self.cut
 
     @cached_property
@@ -300,7 +300,7 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
     """Return the correlations of an uncertain stage if machines can be drawn from it.
 
-    Returns None, with a warning, if nearly every draw is invalid.
+    Returns None, with a warning, if nearly all machines drawn are invalid.
     """
     settings = StudySettings.current()
 

@@ -221,7 +221,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say whether the force limit keeps the stage at its place."""
+    """Say how large the force limit is, and that break-away takes more, if it does."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)

@@ -55,7 +55,7 @@ def window_figure(design: Design) -> Figure:
 
 
 def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str) -> list[Band]:
-    """Return bars of the parts of ranges that are in view."""
+    """Return bars in a row of the figure, for the parts of `ranges` that are in view."""
     clipped = [(max(low, visible[0]), min(high, visible[1])) for low, high in ranges]
     return [
         Band(np.array(ends), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)

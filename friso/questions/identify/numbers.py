@@ -124,7 +124,7 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
 
 
 def _places(estimate: Estimate, factor: float) -> int:
-    """Return the decimal places that the interval allows."""
+    """Return how many decimal places the interval of an estimate leaves certain."""
     half = estimate.half_width * factor
     if not (math.isfinite(half) and half > 0):
         finite = [
@@ -137,7 +137,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 
 def _written(value: float, factor: float, places: int) -> str:
-    """Write a number with a given number of decimal places."""
+    """Write a value times a factor, to so many decimal places, or with an exponent if shorter."""
     if math.isfinite(value) and not -LARGE <= places <= SMALL:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
         return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"

@@ -82,7 +82,10 @@ def map_panel(
 
 
 def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
-    """Return the panel of a map over two axes x and y, the only dimensions of its arrays."""
+    """Return the panel of a map over two axes x and y, the only dimensions of its arrays.
+
+    `marker` is the evaluation point, and `colouring` says how cells are coloured.
+    """
     z, codes = (
         np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
         for array in (colouring.numbers, colouring.codes)
@@ -99,7 +102,7 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 
 
 def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
-    """Return the curve over two axes that separates cells in which hunting attracts."""
+    """Return the curve over two axes that separates cells in which hunting attracts from others."""
     colouring = look(runs, metric)
     codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
     return _edges(x, y, colouring, codes)
@@ -177,7 +180,10 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
 
 
 def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
-    """Return a variable over a single axis as a line, with patches where it has no number."""
+    """Draw a map with a single axis as a line, with patches where the variable has no number.
+
+    A variable of words becomes rows of points.
+    """
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
     occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
     if not np.isfinite(numbers).any():

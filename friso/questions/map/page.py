@@ -84,7 +84,7 @@ def map_html(
 
 
 def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
-    """Return the figure of a map; over two axes, with the place of the swept machine."""
+    """Return the figure of a map; over two axes, with a mark where the swept machine lies."""
     figure, stage = map_figure(runs, metric), machine_of(runs)
     keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
     return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure

@@ -354,9 +354,9 @@ def _another_study(store: Path) -> InputError:
 
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
-    """Return the relative tolerance that the user chose.
+    """Return the relative tolerance of the solver: the user's, or one that is safe for "auto".
 
-    With "auto", it is chosen on a sample of the cells, and logged.
+    It is then the loosest at which enough outcomes of a sample of cells survive, and is logged.
     """
     settings = StudySettings.current()
     if entry != "auto":

@@ -52,9 +52,10 @@ def stage_text(stage: Stage, seed: int) -> str:
 
 
 def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
-    """Write signals of shape (n,) by role, every `interval` [s], below a line of comment.
+    """Write signals of shape (n,), by role, as CSV below a line of comment, the `heading`.
 
-    Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if the file cannot be written.
+    Samples are `interval` [s] apart. Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if
+    the file cannot be written.
     """
     names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
     count = len(next(iter(signals.values())))

@@ -63,7 +63,7 @@ def tune_figures(tuning: Advice) -> list[Figure]:
 
 
 class RemedyLine(NamedTuple):
-    """Label, colour and dashes of the lines of one stage."""
+    """How the lines of one stage look: label, colour and dashes."""
 
     label: str
     colour: str

@@ -162,7 +162,7 @@ def tune(
 
 
 def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
-    """Log the first answer if it works, while the search for a better one goes on."""
+    """Log the first remedy tried if it works, while others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
     from friso.shown.drawing.prefixes import listed
 

@@ -562,7 +562,7 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 
 def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
-    """Return the texts of one row under `COLUMNS`."""
+    """Return the texts of one row of the table: how machines perform, under `COLUMNS`."""
     goal = tuning.goal
     return [
         works,

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    It has the place where it is `asked`, the `command` that answers it, the meaning of the result, and its `answer` for
-    the thesis's rig, from stored findings.
+    `asked` says where, `command` answers it, and the meaning of the result is told. `answer` is that for the thesis's
+    rig, from stored findings.
     """
 
     asked: str

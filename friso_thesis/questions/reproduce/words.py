@@ -151,7 +151,7 @@ def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
 def open_rows() -> list[Sequence[str]]:
     """Return the values that the thesis leaves open.
 
-    Each row has the range, the distribution of draws, friso's own choice, and the reason.
+    Each row has the range, how values are drawn from it, friso's own choice, and the reason.
     """
     drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
     return [

@@ -52,10 +52,10 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
 
 
 def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of a stage with changes in its settled states.
+    """Return the least modulus margin of a stage in the states in which it settles.
 
-    Changes are flat keys to SI numbers, and the stage is sampled like the thesis's drive. The margin is 0 if a state is
-    not stable.
+    `changes` are keys that are changed first, in SI. The stage is sampled like the thesis's drive. The margin is 0 if a
+    state is not stable.
     """
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 

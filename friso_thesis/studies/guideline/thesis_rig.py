@@ -54,17 +54,17 @@ class Laws:
     free: FittedLaw
 
     def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] of stages with the joint locked.
+        """Return the edge [Hz] of stages with the joint locked, by the law.
 
-        Stages are given by flat keys to SI numbers or arrays.
+        Stages are given by keys [SI] with numbers or arrays.
         """
         values, rate = _shaped(flat)
         return self.locked.edge(values) * rate
 
     def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] of stages with the joint free.
+        """Return the edge [Hz] of stages with the joint free, by both laws.
 
-        Stages are given by flat keys to SI numbers or arrays.
+        Stages are given by keys [SI] with numbers or arrays.
         """
         values, rate = _shaped(flat)
         return self.free.edge(values, self.locked.edge(values)) * rate
@@ -88,7 +88,7 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
 
 
 def plain_rig(part: str = "") -> dict[str, Any]:
-    """Return the flat keys of the rig without its parasitic mode.
+    """Return the rig's keys [SI] without its parasitic mode.
 
     The joint is left out too, unless `part` is "joint".
     """

@@ -80,8 +80,8 @@ class CycleComparison:
     - `field`: on rails with random friction, shape (deviations, lengths, rails). `asymmetry` is the difference in the
       logarithm of static friction between the two sides of the target, at half the even rail's swing from it.
     - `rolling`, `rolling_asymmetry`: on rails whose friction has a first harmonic, shape (harmonics, rails).
-    - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb). The motors are the
-      one that the drive assumes and the weaker one of `MOTORS`.
+    - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb). The motors are
+      the one that the drive assumes and the weaker one of `MOTORS`.
     - `others`: on an even rail with one other change, by its name. If one start does not lead to a cycle, another was
       taken.
     - `traces`: the even rail, and the varied rail with the slowest cycle of a similar swing (None: there is none).
@@ -157,7 +157,11 @@ def compare_cycles(
     machines: int,
     progress: Progress,
 ) -> CycleComparison:
-    """Compare the cycles of a stage with its joint locked, on `machines` rails of each kind."""
+    """Compare the cycles of a stage with its joint locked, on `machines` rails of each kind.
+
+    Kinds differ by the `deviations` of friction, its correlation `lengths` in swings of the stage, and `harmonics` of
+    rolling elements.
+    """
     even = on_rail(stage)
     plain = started(even, seed, {}, 1, progress, "an even rail")
     swing = float(plain.swing[0]) if plain.swings[0] else 0.01 * distance(stage)

@@ -102,7 +102,7 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
 
 
 def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
-    """Judge whether, with a weaker motor, the rig's mass is nearer `seen` than `weighed` [kg].
+    """Judge whether a weaker motor brings the apparent mass nearer `seen` than `weighed` [kg].
 
     `joint` is 0 for locked, 1 for free.
     """
