@@ -45,8 +45,9 @@ class Damping:
 class DesignedController:
     """Gains by van Dijk's rules at the chosen `crossover` [Hz].
 
-    `margin` is the least modulus margin as designed, over the states in which the stage settles. `corners` is that of
-    each corner of friction and masses, shape (n,). `damping` shows what more damping of the joint would add.
+    `margin` is the least modulus margin as designed, over the limit cases and all states stuck under a bias force.
+    `corners` is that of each corner of friction and masses, shape (n,). `damping` shows what more damping of the joint
+    would add.
     """
 
     crossover: float
@@ -65,7 +66,8 @@ def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
     """Return the ranges of crossovers [Hz] in which the least modulus margin is at least 0.5.
 
-    They hold in all states in which the stage settles, for its own masses and all masses in the population.
+    They hold for the limit cases and all states stuck under a bias force, for the stage's own masses and all masses in
+    the population.
     """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable

@@ -78,7 +78,7 @@ class NoDesign(Exception):
         self.reason, self.relaxed, self.need = reason, relaxed, need
 
     def of(self, need: Need) -> NoDesign:
-        """Return the error with the result on whether the machine needs an isolator."""
+        """Return this error, with the result on whether the machine needs an isolator."""
         return NoDesign(self.reason, self.relaxed, need)
 
 

@@ -26,11 +26,12 @@ AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
 
 @dataclass(frozen=True)
 class Modal:
-    """A stage in the states in which it settles, with its plants over `omega` [rad/s].
+    """A stage in its settled states, with its plants over `omega` [rad/s].
 
-    `bare` are the plants without parasitic mode, and `with_modes` the plants with the modes of the leaf springs. Both
-    have shape (states, frequencies) [m/N] and include the drive. Modes are added to the motion of the stage as a rigid
-    mass, because they lie far above the frequencies at which the cart matters.
+    Settled states are the limit cases, and stuck under a bias force. `bare` are the plants without parasitic mode, and
+    `with_modes` the plants with the modes of the leaf springs. Both have shape (states, frequencies) [m/N] and include
+    the drive. Modes are added to the motion of the stage as a rigid mass, because they lie far above the frequencies at
+    which the cart matters.
     """
 
     flat: Mapping[str, Any]
@@ -41,7 +42,7 @@ class Modal:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
-        """Build the states of a stage, given by its keys in SI, with the modes of its leaf springs."""
+        """Build the settled states of a stage, from its keys in SI, with its leaf springs' modes."""
         rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
         members, drive = settled_members(rigid), DriveTiming.of(rigid)
         omega = _frequencies(rigid, leaves, drive)

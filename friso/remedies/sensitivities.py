@@ -80,9 +80,10 @@ class SettlingDerivatives:
 
 @dataclass(frozen=True)
 class MarginDerivatives:
-    """The least modulus margin of all settled states, and its derivatives [1/SI], (keys,).
+    """The least modulus margin of a stage's settled states, and its derivatives [1/SI], (keys,).
 
-    They hold for the state and the frequency at which the loop comes closest to -1.
+    Settled states are the limit cases, and stuck under a bias force. The derivatives hold for the state and the
+    frequency at which the loop comes closest to -1.
     """
 
     margin: float
@@ -306,9 +307,9 @@ def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray
 
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
-    """Return derivatives of the starting states to the keys, shape (states, keys).
+    """Return derivatives of the states in which a motion starts, shape (states, keys).
 
-    They are central differences of settled states.
+    They are central differences over small changes of the keys.
     """
     settings = RemedySettings.current()
     columns = []
@@ -323,7 +324,7 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
     """Return the least modulus margin and its derivatives by central differences.
 
-    Returns None if a settled state is unstable.
+    Returns None if the loop is unstable in a limit case, or stuck under a bias force.
     """
     settings = RemedySettings.current()
     members = settled_members(flat)

@@ -170,7 +170,7 @@ def _ratio(median: EstimatedValue) -> str:
 
 
 def _margin(result: OptionResult, comparison: Comparison) -> str:
-    """Write the modulus margin of an option, and the least one or the number of unstable machines."""
+    """Write an option's modulus margin, and the least of all machines or how many are unstable."""
     least = f"least {result.loops.margin.min():.2f}"
     if result.unstable:
         least = f"{result.unstable} of {comparison.machines.count} not stable"

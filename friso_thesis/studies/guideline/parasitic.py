@@ -26,8 +26,9 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 class ParasiticLimits:
     """Range of crossovers that a parasitic mode allows, with the joint locked and free.
 
-    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover, and has a
-    modulus margin of at least 0.5 in all settled states; None if the stage lacks this margin at its own crossover.
+    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover. In it the
+    modulus margin of the limit cases, and stuck under a bias force, is at least 0.5. It is None if the stage lacks this
+    margin at its own crossover.
     """
 
     frequency: float
@@ -52,7 +53,7 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
 
 
 def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of a stage in the states in which it settles.
+    """Return the least modulus margin of a stage's limit cases, and stuck under a bias force.
 
     `changes` are keys that are changed first, in SI. The stage is sampled like the thesis's drive. The margin is 0 if a
     state is not stable.

@@ -61,8 +61,8 @@ class WorkedDesign:
     """An isolator for a crossover limit [Hz].
 
     `aim` [Hz] is the edge for which the law designs it. It has a stiffness [N/m], the stroke that it needs [m], and the
-    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin of
-    the settled states at the limit, with the rig's own friction and parasitic mode.
+    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin at
+    the limit, in the limit cases and stuck under a bias force. It holds for the rig's own friction and parasitic mode.
     """
 
     limit: float

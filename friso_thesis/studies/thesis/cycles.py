@@ -110,7 +110,10 @@ def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
 
 
 def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
-    """Find the curves of a study's map, and compare the survey with the runs."""
+    """Follow the curves on a study's map where cycles stop attracting.
+
+    The survey of what attracts is also compared with the peaks counted in the runs.
+    """
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
     about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))

@@ -202,9 +202,10 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
 def _by_attraction(
     entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], cycles: Mapping[str, CyclesOnMap]
 ) -> Finding | None:
-    """Return the finding by what attracts the stages, or None.
+    """Judge a claim by what attracts the stages of its maps, instead of by counted peaks.
 
-    It is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not depend.
+    The result is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not
+    depend.
     """
     maps = entry.needs & STUDIES.keys()
     if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):

@@ -86,7 +86,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
-    """Judge the crossings of the locked rig, sliding, at the thesis's settings."""
+    """Judge whether loops of the locked rig, sliding, cross 0 dB where they are tuned."""
     words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}

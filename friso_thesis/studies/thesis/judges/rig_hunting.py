@@ -54,12 +54,12 @@ def _rails(counted: tuple[int, int]) -> str:
 
 @judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
 def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
-    """Judge the move at 8 Hz."""
+    """Judge whether the rig hunts after the move at 8 Hz if locked, and settles if free."""
     return judged_move(evidence.experiments.moves)
 
 
 def judged_move(moves: MovesOnRails) -> Finding:
-    """Judge moves on several rails."""
+    """Judge on how many rails peaks are counted after the move, joint locked and joint free."""
     words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
@@ -78,7 +78,7 @@ def judged_move(moves: MovesOnRails) -> Finding:
 
 @judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
 def locked_needs_crossover(evidence: Evidence) -> Finding:
-    """Judge the move at the crossovers of Fig. 25, and releases at the middle one."""
+    """Judge which crossover the locked rig needs, by the move of Fig. 25 and by releases."""
     return judged_crossovers(evidence.experiments.moves)
 
 
@@ -119,7 +119,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """Judge the fraction of rails over stroke and crossover."""
+    """Judge whether more stroke needs less crossover, by the rails with counted peaks."""
     return judged_grid(evidence.experiments.grid)
 
 
@@ -153,12 +153,12 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
 
 @judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
 def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
-    """Judge the cycle on an even rail against cycles on rails that vary."""
+    """Judge whether cycles on rails that vary are slower than the cycle on an even rail."""
     return judged_cycles(evidence.experiments.cycles)
 
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
-    """Judge cycles on an even rail, as the thesis simulates, and on rails that vary."""
+    """Judge the cycle on an even rail, as the thesis simulates, and those on varied rails."""
     words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
@@ -235,7 +235,7 @@ def free_joint_stands_less_still(evidence: Evidence) -> Finding:
 
 
 def judged_standstill(standstill: InPosition) -> Finding:
-    """Judge standstills."""
+    """Judge whether the stage stands less still with its joint free, and what damping recovers."""
     words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")

@@ -1,4 +1,7 @@
-"""Judge Fig. 13: the force's shares while the stage sticks, at two friction gaps."""
+"""Judge Fig. 13: the terms of the force while the stage sticks, at two friction gaps.
+
+The gap is static minus Coulomb friction.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,7 @@ class Sticking:
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
-    """Judge sticking time, and fraction of the integral action at break-away, at both gaps."""
+    """Judge for how long the stage sticks at both gaps, and the integral's part in the force."""
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     why = (
         ""
