@@ -21,7 +21,7 @@ from friso.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Corners:
-    """Corners of a specification with the edge of hunting of each.
+    """Extremes of friction and masses (corners), and the edge of hunting at each.
 
     `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts. It is 0 if it does not hunt from
     `searched[0]` on, and infinite if it still hunts at `searched[1]`. `unknown` counts the corners whose edge is not
@@ -62,7 +62,7 @@ def edges_over(
     progress: Progress = silent,
     label: str = "",
 ) -> Corners:
-    """Find the edges of the stage `flat` in all corners, with van Dijk's tuning rules.
+    """Find the edge of hunting of a stage at each machine of a population, by van Dijk's rules.
 
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts, then refines between
     that point and the one above. `label` names the search to the progress.
@@ -90,9 +90,9 @@ def edges_over(
 
 
 def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
-    """Return in each corner the highest edge of hunting under several friction laws.
+    """Return at each corner of friction and masses the highest edge of hunting of all laws.
 
-    All laws must have been searched over the same corners and range.
+    All friction laws must have been searched over the same corners and range.
     """
     several = [*by_law.values()]
     edges = np.max([corners.edges for corners in several], axis=0)

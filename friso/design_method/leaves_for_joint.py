@@ -109,7 +109,7 @@ class _Search:
         """Return the cost of leaf springs by length and spacing [m], rows of (count, 2).
 
         `bought` has the sheet of each row. Leaves that break a requirement cost more, the farther they break it. For
-        other leaves, the cost falls as the frequency of their first mode rises that interferes with control.
+        other leaves, the cost falls as the frequency of the first mode that interferes with control rises.
         """
         settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)

@@ -28,10 +28,10 @@ AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
 class Modal:
     """A stage in its settled states, with its plants over `omega` [rad/s].
 
-    Settled states are the limit cases, and stuck under a bias force. `bare` are the plants without parasitic mode, and
-    `with_modes` the plants with the modes of the leaf springs. Both have shape (states, frequencies) [m/N] and include
-    the drive. Modes are added to the motion of the stage as a rigid mass, because they lie far above the frequencies at
-    which the cart matters.
+    Settled states are the limit cases, and all states stuck under a bias force. `bare` are the plants without parasitic
+    mode, and `with_modes` the plants with the modes of the leaf springs. Both have shape (states, frequencies) [m/N]
+    and include the drive. Modes are added to the motion of the stage as a rigid mass, because they lie far above the
+    frequencies at which the cart matters.
     """
 
     flat: Mapping[str, Any]

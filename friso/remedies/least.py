@@ -66,10 +66,11 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
-    """Yield the smallest changes for a remedy of `least_remedy`, each of shape (variables,).
+    """Yield the smallest changes of the controller that may work, each of shape (variables,).
 
-    Fewer keys come first, then smaller factors. Single keys are tried first, because any change of one key counts as
-    smaller than a change of several. Only changes smaller than `most` are returned (see `change_costs`).
+    The remedy searched varies each changed key separately (see `least_remedy`). Fewer keys come first, then smaller
+    factors. Single keys are tried first, because any change of one key counts as smaller than a change of several. Only
+    changes smaller than `most` are returned, a size as of `size_cost`.
     """
     yield from of_one_key(search, most)
     if most >= min(2, len(search.remedy.variables)):
@@ -108,8 +109,8 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield the points (points, variables) that work on fresh machines, of which none hunts.
 
-    At least the fraction `enough` of these machines must meet the goal by moves and margins. By default, it is the
-    fraction that also makes it likely for all machines.
+    At least the fraction `enough` of these machines must meet the goal by moves and margins. By default, it lies one
+    standard error above the fraction required of all machines.
     """
     settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough
@@ -141,10 +142,10 @@ def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """Return points from which a search starts, as coordinates of shape (points, variables).
+    """Return settings from which a search starts, as coordinates of shape (points, variables).
 
-    The working settings come first. Then follow settings in which only some keys change, the fewest first. Changes are
-    taken wholly, and half-way in the logarithm.
+    First come those that are already known to work. Then follow settings in which only some keys change, the fewest
+    first. Changes are taken wholly, and half-way in the logarithm.
     """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
@@ -153,13 +154,13 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Return coordinates of each variable's present and working value, shape (variables, 2)."""
+    """Return each variable's present value, and one that works, as coordinates, (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """Yield points to verify, each of shape (variables,), the smallest change first.
+    """Yield settings to verify, as points of shape (variables,), the smallest change first.
 
     They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
     the working settings, then other points tried. Points that work on fresh machines come before all others.

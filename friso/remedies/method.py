@@ -134,7 +134,7 @@ class Advice:
         return _recommended(self.working, self.goal)
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
-        """Return the outcome of a remedy's joint when made of leaf springs."""
+        """Return the outcome of a remedy's joint when made of leaf springs, or None."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
 
     @property
@@ -483,7 +483,7 @@ class _Session:
                 self.outcomes[place] = outcome
 
     def interrupted(self) -> None:
-        """Record the best point so far of the current remedy, which is not verified."""
+        """Record the best settings so far of the current remedy, which are not verified."""
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
@@ -502,10 +502,9 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Verify points of a search in turn until one works, and record its outcome.
+        """Verify settings that a search offers, in turn until some work, and record the outcome.
 
-        If none does, the first outcome is recorded, which is not sure to work. Few points are tried, and the work is
-        limited.
+        If none do, the first outcome is recorded, which is not sure to work. Few are tried, and the work is limited.
         """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
@@ -542,11 +541,11 @@ class _Session:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
-        """Measure a point on fresh machines, and verify it by limit cycles if enough meet the goal.
+        """Measure settings on fresh machines; verify them by limit cycles if enough meet the goal.
 
-        The machines make all moves, or those from `moves_from` [m] on. The interval of the fraction of machines that
-        meet the goal must lie at the required fraction or above. While the interval leaves that open, further machines
-        are measured.
+        `shares` are their coordinates. The machines make all moves, or those from `moves_from` [m] on. The interval of
+        the fraction of machines that meet the goal must lie at the required fraction or above. While the interval
+        leaves that open, further machines are measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -590,7 +589,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
-    """Return the outcome of an interrupted search: its best point so far, which is not verified."""
+    """Return the outcome of an interrupted search: its best settings so far, not verified."""
     if not search.tried:
         return outcome
     points = search.points

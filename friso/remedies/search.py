@@ -45,14 +45,14 @@ class Budget:
 
 @dataclass(frozen=True)
 class TriedPoints:
-    """Tried points, one in each row, and how the machines performed.
+    """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
     times [s] hold for 95 % of the machines: within the tolerance, within the looser one, and with the bandwidth lower
     by the distance from hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The
-    bandwidth [Hz] is that of the stage file's machine (see `loop_bandwidth`). `nearness`, from 0 to 1, tells how near
-    the machines are to settling (see `Search.measured`). `moves_from` [m] is the smallest move from which all machines
-    settle; infinite if the largest move does not settle.
+    bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1, grows
+    with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
+    machines settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -131,7 +131,7 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 
 @dataclass
 class Search:
-    """Search for the best points of a remedy on `machines`.
+    """Search for the best settings of a remedy, called points, on `machines`.
 
     Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
     surveyed points at which machines hunt, or may hunt. `cut` is true if the search took too much work.
@@ -151,19 +151,19 @@ class Search:
 
     @property
     def points(self) -> TriedPoints:
-        """Return the points that were tried on all machines."""
+        """Return the settings tried, without those that were stopped before all machines had moved."""
         return (begun := self.begun).take(np.flatnonzero(begun.whole))
 
     @property
     def begun(self) -> TriedPoints:
-        """Return all points that were tried, if any, including those that were stopped early."""
+        """Return all settings tried, if any, including those that were stopped early."""
         tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
         return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
 
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
     ) -> None:
-        """Try points until they no longer improve, or until that takes too much work (`cut`).
+        """Try settings until they no longer improve, or until that takes too much work (`cut`).
 
         The search minimises the settling time, or the quantity `wanted`: a function from points (points, variables) to
         numbers (points,). A search of several variables may begin with the points `start`.
@@ -172,7 +172,7 @@ class Search:
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
-        """Try points (points, variables) in batches, and return those that break no constraint."""
+        """Try settings, as points (points, variables), in batches; yield those that meet the goal."""
         tuning = RemedySettings.current()
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
@@ -260,7 +260,7 @@ class Search:
             _evolve(cost, near, ends, self.budget.refined)
 
     def _is_hopeless(self, generation: int) -> bool:
-        """Tell whether no point comes near to settling after some generations."""
+        """Tell whether, after some generations, no settings let the machines nearly settle."""
         tuning, points = RemedySettings.current(), self.points
         return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
@@ -283,13 +283,13 @@ class Search:
         return roots
 
     def _bandwidth(self, shares: np.ndarray) -> np.ndarray:
-        """Return the bandwidths of points (points, variables) on the stage file's machine [Hz]."""
+        """Return the bandwidths [Hz] of the stage file's machine at settings (points, variables)."""
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
     def measured(
         self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
     ) -> TriedPoints:
-        """Simulate moves at points on the machines, and return how the machines performed.
+        """Simulate moves of the machines with each of several settings, and return how they perform.
 
         Moves are simulated only if the loop is stable with half of the margin required. A remedy of several variables
         must also not exceed the bandwidth limit by far. Other moves chatter and take most of the work.
@@ -358,7 +358,7 @@ class Search:
         return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
-        """Tell at which points (points, variables) no machine hunts, shape (points,)."""
+        """Tell with which settings, (points, variables), no machine hunts; the shape is (points,)."""
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         least = self.goal.share
@@ -367,10 +367,10 @@ class Search:
         return np.asarray(clear)
 
     def share(self, shares: np.ndarray) -> np.ndarray:
-        """Return the fraction of fresh machines that meet the goal at points, (points,).
+        """Return the fraction of fresh machines that meet the goal with each of several settings.
 
-        Only moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the
-        fraction with enough margin is returned.
+        Only moves and margins count. `shares` has shape (points, variables), the result (points,). If too many machines
+        lack the margin, the fraction with enough margin is returned.
         """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
@@ -383,7 +383,7 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """Yield the best points of shape (variables,) at which no machine hunts.
+        """Yield the best settings, as points of shape (variables,), with which no machine hunts.
 
         Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
         meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
@@ -431,10 +431,10 @@ class Search:
             yield from best[self.clear(best)]
 
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
-        """Return better points near a point (variables,), the best first.
+        """Return better settings near a point (variables,), the best first.
 
         The point was taken because better ones failed: there machines hunted, or too few met the goal. New points are
-        drawn around the point, then around the point taken next.
+        chosen at random around the point, then around the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -497,7 +497,7 @@ def _evolve(
     generations: int,
     is_hopeless: Callable[[int], bool] = lambda generation: False,
 ) -> None:
-    """Run differential evolution from points (points, variables) between `ends`.
+    """Run SciPy's differential evolution from points (points, variables) between `ends`.
 
     A new point replaces its rival only if it costs less; `cost` receives the rival's cost so that it can stop early.
     After each generation, `is_hopeless` receives its number and may end the search.

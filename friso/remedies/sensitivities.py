@@ -82,8 +82,8 @@ class SettlingDerivatives:
 class MarginDerivatives:
     """The least modulus margin of a stage's settled states, and its derivatives [1/SI], (keys,).
 
-    Settled states are the limit cases, and stuck under a bias force. The derivatives hold for the state and the
-    frequency at which the loop comes closest to -1.
+    Settled states are the limit cases, and all states stuck under a bias force. The derivatives hold for the state and
+    the frequency at which the loop comes closest to -1.
     """
 
     margin: float
@@ -92,7 +92,7 @@ class MarginDerivatives:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of cycle, edge of hunting, margin and settling time to keys of a stage.
+    """Derivatives of cycle, edge of hunting, margin and settling time by keys of a stage.
 
     `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The
     settling time is also None if it was not asked for.
@@ -336,7 +336,7 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
     omega = np.array([2 * np.pi * closest.closest])
 
     def distance(changes: Mapping[str, float]) -> float:
-        """Return the distance of the loop from -1 at the changed keys."""
+        """Return the least distance of the loop from -1 if the keys are changed, at one frequency."""
         nearby = {**flat, **changes}
         return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
 

@@ -42,8 +42,8 @@ def sentences(bode: Bode) -> list[str]:
 def stability(bode: Bode) -> list[str]:
     """Say whether the loop is stable in the settled states, and with which margin.
 
-    These are the limit cases, and stuck under a bias force. Further sentences say whether the loop is stable in all
-    other states, and why not.
+    Settled states are the limit cases, and all states stuck under a bias force. Further sentences say whether the loop
+    is stable in all other states, and why not.
     """
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]

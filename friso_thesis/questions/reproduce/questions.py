@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    `asked` says where, `command` answers it, and the meaning of the result is told. `answer` is that for the thesis's
-    rig, from stored findings.
+    `asked` names the section that asks, and `command` answers. A text says what the result means. `answer` is that for
+    the thesis's rig, from stored findings.
     """
 
     asked: str

@@ -158,8 +158,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 def safe_over_friction(locked: Fit) -> float:
     """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    Each range of the ratio of slip rate to drop rate has its own factor. It is the largest of the ranges in which the
-    rig may lie.
+    Each range of the ratio of the law's two rates has its own factor. It is the largest of the ranges in which the rig
+    may lie.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]

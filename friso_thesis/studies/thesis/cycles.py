@@ -34,7 +34,7 @@ SMALLEST = 1e-3
 
 @dataclass(frozen=True)
 class Edge:
-    """A curve on which a cycle stops attracting.
+    """A curve in a map of two keys on which a cycle stops attracting.
 
     It has a kind, whether the cycle is the symmetric one, and its points [SI] along the two axes of the map, shape
     (points,) each.
@@ -121,7 +121,7 @@ def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: K
 
 
 def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
-    """Return edges as arrays by number and name."""
+    """Return curves as arrays, each named by the number of the curve and its field."""
     return {f"{n}.{key}": np.asarray(value) for n, edge in enumerate(edges) for key, value in vars(edge).items()}
 
 

@@ -83,8 +83,8 @@ def _written(expression: sp.Expr) -> str:
 def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
     """Return the least modulus margin with the joint free, by crossover; 0 if not stable.
 
-    Crossovers are relative to the `first` eigenfrequency [Hz]. The margin is that of the limit cases, and stuck under a
-    bias force.
+    Crossovers are relative to the `first` eigenfrequency [Hz]. The margin is that of the limit cases, and of all states
+    stuck under a bias force.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     reach = 2 * JudgeSettings.current().far_crossover_factor

@@ -38,7 +38,7 @@ _UNIFORM = "uniform friction along the rail, no noise"
 
 @judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
-    """Judge the position steps of the rig with its cart fixed."""
+    """Judge the joint's stiffness from position steps of the rig with its cart fixed."""
     return judged_steps(evidence.experiments.joint_steps)
 
 

@@ -39,7 +39,7 @@ def shortening_is_negligible(evidence: Evidence) -> Finding:
 
 
 def judged_shortening(leaves: Evaluation) -> Finding:
-    """Judge leaf springs at full stroke."""
+    """Judge how nonlinear leaf springs are, and how much they shorten, at full stroke."""
     share, least = leaves.shortening / leaves.stroke, JudgeSettings.current().negligible_share
     return Finding(
         (

@@ -148,9 +148,9 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
-    """Judge the free joint's crossing, tuned for the whole mass, and its highest setting.
+    """Judge where the loop of the free joint, tuned for the whole mass, crosses 0 dB.
 
-    The setting is the highest stable one.
+    The highest crossover up to which it is stable is judged as well.
     """
     words = reading()
     analysis = evidence.analysis

@@ -32,7 +32,7 @@ TRAVEL = 0.16
 
 @judges("F11A", figure="11A", needs=("path",))
 def path_is_no_cure(evidence: Evidence) -> Finding:
-    """Judge whether scattered cells settle only below a hyperbola of acceleration and its time."""
+    """Judge whether any path ends hunting, over acceleration and acceleration time."""
     words = reading()
     acceleration, time, moving, valid = verdict_table(
         evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"

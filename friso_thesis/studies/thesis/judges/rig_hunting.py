@@ -83,7 +83,7 @@ def locked_needs_crossover(evidence: Evidence) -> Finding:
 
 
 def judged_crossovers(moves: MovesOnRails) -> Finding:
-    """Judge moves and releases with the joint locked."""
+    """Judge at which crossovers peaks are counted after moves and releases, joint locked."""
     low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
     words, quiet = reading(), (middle[1] - middle[0], middle[1])
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]

@@ -118,7 +118,7 @@ def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
 
 @judges("S41A", figure="Sec. 4.1, alpha and break-away", needs=(LOW_ALPHA, HIGH_ALPHA))
 def larger_alpha_breaks_away_sooner(evidence: Evidence) -> Finding:
-    """Judge the sticks at both ends of the range of alpha."""
+    """Judge for how long the stage sticks at both ends of the range of alpha."""
     low, high = (cycle_of(evidence.responses[name]).stick for name in (LOW_ALPHA, HIGH_ALPHA))
     undecided = "" if low.both and high.both else NOTHING_TO_COMPARE
     return Finding(
