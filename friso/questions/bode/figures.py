@@ -71,7 +71,7 @@ def bode_figures(bode: Bode) -> tuple[Figure, ...]:
 
 
 def first_figures(bode: Bode) -> tuple[Figure, ...]:
-    """Return the figures of the limit cases alone, which need less time than the family."""
+    """Return the figures of the limit cases alone, which need less time than all states."""
     return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
 
 
@@ -199,7 +199,7 @@ def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
 
 
 def _nyquist(bode: Bode) -> Figure:
-    """Draw the open loop near -1: the limit cases, with the family behind them."""
+    """Draw the open loop near -1: the limit cases, with all states of friction behind them."""
     family = [
         *_family(bode, True, "stable states of the family", LIGHT),
         *_family(bode, False, "unstable states of the family", LOST),
@@ -224,7 +224,7 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Return Nyquist curves of some stable or unstable members of the family, evenly picked.
+    """Return Nyquist curves of some stable or unstable states of friction, evenly picked.
 
     Only the parts near -1 are kept. The first curve is called `name` in the legend; all have the colour `shade`.
     """
@@ -239,7 +239,7 @@ def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
 
 
 def _sensitivity(bode: Bode) -> Figure:
-    """Draw the sensitivity of the stable limit cases, and the band of the stable family."""
+    """Draw the sensitivity of the stable limit cases, and the band of all stable states behind."""
     stable = bode.scan.stable
     lines = tuple(
         Series(_hertz(bode), -magnitude(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)

@@ -24,7 +24,7 @@ ANY = "no limit"
 
 
 def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table; rows in which no state has an entry are left out."""
+    """Return the rows of the table, one text for each state; rows without entries are left out."""
     texts = [("State", [item.where or NOTHING for item in states])]
     texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]
     for loop in get_args(CascadeLoop):

@@ -138,7 +138,7 @@ def _unit(bode: Bode) -> str:
 
 
 def _states_checked(bode: Bode) -> str:
-    """Describe the family of states that were checked."""
+    """Describe which states of friction were checked."""
     members = bode.scan.members
     parts = []
     if has_friction(bode):

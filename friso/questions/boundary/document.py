@@ -27,7 +27,7 @@ def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> di
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
-    """Return the special points, the branches of cycles, and the verdicts at both ends of one key."""
+    """Return flips, folds and other special points, branches, and the verdicts at both ends."""
     branches = lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {

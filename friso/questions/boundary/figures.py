@@ -103,7 +103,7 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
-    """Draw one measure of all branches with their special points.
+    """Draw one measure of all branches, with their flips, folds and other special points.
 
     Labels are added if there is a key.
     """

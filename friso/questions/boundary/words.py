@@ -279,7 +279,7 @@ def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
 def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
     """Say at which value, or between which values, hunting begins or ends.
 
-    `errors` holds the errors of special points [SI] by their values.
+    `errors` holds errors [SI] by the values of flips, folds and other special points.
     """
     if change.low == change.high:
         return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
@@ -287,14 +287,14 @@ def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, floa
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
-    """Describe each special point and each branch over one key."""
+    """Describe each branch over one key, and its flips, folds and other special points."""
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
     return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
-    """Say what happens to a cycle at a special point as the key rises."""
+    """Say what happens to a cycle at a flip, fold or other special point as the key rises."""
     value = float(line.at[k, 0])
     above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
     goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)

@@ -46,7 +46,7 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _return_map(item: ShownCase) -> list[Panel]:
-    """Return the panel of a case's return map; none if swings were not followed.
+    """Return the panel of a stage's return map; none if swings were not followed.
 
     It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
     """
@@ -128,10 +128,7 @@ def cycle_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _cycle_panels(item: ShownCase) -> list[Panel]:
-    """Return the panels of a case's cycles.
-
-    They show position and force over time, and velocity over position.
-    """
+    """Return panels of a stage's cycles: position and force over time, velocity over position."""
     cycles = item.case.judgement.hunting.cycles
     time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
     names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]

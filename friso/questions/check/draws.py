@@ -22,7 +22,10 @@ MOST_LISTED = 4
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
-    """Return the table's rows on machines drawn from uncertain keys, with one text per case."""
+    """Return the table's rows on machines drawn from uncertain keys.
+
+    Each has a text for the joint as given, locked and free.
+    """
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
         ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
@@ -43,7 +46,10 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 
 
 def draws_sentences(draws: Draws) -> list[str]:
-    """Say what the machines drawn do, in one sentence per case, and which were left out."""
+    """Say what the machines drawn do, with the joint as given, locked and free.
+
+    Then say which were left out.
+    """
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
     cases = case_labels(draws.stage).items()
@@ -99,7 +105,10 @@ def _narrowed(draws: Draws) -> str:
 
 
 def _sentence(name: str, draws: Draws) -> str:
-    """Say with which probability a case hunts, how far, and which key matters most."""
+    """Say with which probability the stage hunts, how far, and which key matters most.
+
+    `name` is the case: "given", "locked" or "free".
+    """
     fates = draws.fates[name]
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
     lost = int(np.count_nonzero(fates.unstable))
@@ -126,7 +135,10 @@ def _sentence(name: str, draws: Draws) -> str:
 
 
 def draws_figure(draws: Draws) -> Figure:
-    """Draw stacked bars of the verdicts on machines over the most influential key, case by case."""
+    """Draw stacked bars of the verdicts on machines over the most influential key.
+
+    There is a panel for each state of the joint.
+    """
     panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
         f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
@@ -136,7 +148,7 @@ def draws_figure(draws: Draws) -> Figure:
 
 
 def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
-    """Draw stacked bars of a case's verdicts over the key that best separates them.
+    """Draw stacked bars of the verdicts on machines over the key that best separates them.
 
     The key is one of the uncertain keys from which machines were drawn.
     """

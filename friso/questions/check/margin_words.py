@@ -60,7 +60,7 @@ def margin_ways(margin: ParameterMargin) -> list[str]:
 
 
 def thin_margins(case: Case) -> list[str]:
-    """List small margins of a case that settles: what little change brings hunting back.
+    """List small margins of a stage that settles: what little change brings hunting back.
 
     A margin is small if it is less than the distance from the edge that advice keeps.
     """

@@ -85,7 +85,7 @@ class CheckAnswer(Answer):
 
     @property
     def failure(self) -> str:
-        """Say whether the run of a case failed or ran away; empty if all went well."""
+        """Say whether a run failed or ran away, and in which case; empty if all went well."""
         if any(not case.solver.done and not case.runs_away for case in self.result.values()):
             return "the computation could not be completed; see the status above"
         away = any(case.runs_away for case in self.result.values())
@@ -108,7 +108,10 @@ class CheckAnswer(Answer):
         return [*drawn, *answer(self.result), *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """Return the numbers of each case, of the stages drawn, and across friction laws."""
+        """Return the numbers of each case, of the machines drawn, and across friction laws.
+
+        The cases are the stage as given, with its joint locked, and with its joint free.
+        """
         from friso.questions.check.draws import draws_rows
         from friso.questions.check.laws import laws_columns, laws_rows
         from friso.questions.check.table import rows, rows_behind
@@ -158,7 +161,7 @@ class CheckAnswer(Answer):
         return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
 
     def figures(self) -> Sequence[Figure]:
-        """Return the figures of the motion and of the hunting cycles of each case."""
+        """Return the figures of motion and hunting cycles, as given and with joint locked and free."""
         from friso.questions.check.figures import check_figures
 
         return check_figures(self.traced)
@@ -273,7 +276,7 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return a case; its verdict is not certain if the drive alone makes the loop unstable."""
+    """Return a check's result, not certain if the drive alone makes the loop unstable."""
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")
@@ -286,9 +289,9 @@ def _as_built(case: Case) -> Case:
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
-    """Log the verdict on a case as soon as it is certain, while other parts are still computed.
+    """Log the verdict on a stage as soon as it is certain, while other parts are still computed.
 
-    The message is information of the logger "friso".
+    `name` is the case: "given", "locked" or "free". The message is information of the logger "friso".
     """
     from friso.questions.check.words import IN_SHORT
     from friso.shown.cases import case_labels

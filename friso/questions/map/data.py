@@ -42,7 +42,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     """Return everything that the page's script reads, ready for JSON.
 
     Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
-    `drawn` holds the runs of all cells. Raises ValueError as `look` and `axes_of` do.
+    `drawn` holds the runs of all cells. Raises ValueError for runs without axes, or without the metric.
     """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims

@@ -66,9 +66,10 @@ def map_panel(
 ) -> Panel:
     """Return the panel of a variable over the two axes of a map, for figures of several maps.
 
-    The first axis points to the right. Arguments are as for `map_figure`. By default, the title is the variable with
-    the values at which a larger map was cut. Raises ValueError for runs without exactly two axes, and as `map_figure`
-    does.
+    The first axis points to the right. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is
+    the evaluation point: SI values or words by key. By default, the title is the variable with the values at which a
+    larger map was cut. Raises ValueError for runs without exactly two axes, a missing metric, or a marker that lacks an
+    axis.
     """
     axes = axes_of(runs)
     if len(axes) != 2 or SAMPLE in runs.dims:
