@@ -173,9 +173,9 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the verdict on each case in one word, from its attractors.
+    """Yield the verdict in one word, for the joint locked and free if the stage has one.
 
-    The verdict is computed as a map of one cell, or of two cells for the joint locked and free.
+    It follows from attractors, as in a map of one or two cells.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)

@@ -70,7 +70,7 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 
     The remedy searched varies each changed key separately (see `least_remedy`). Fewer keys come first, then smaller
     factors. Single keys are tried first, because any change of one key counts as smaller than a change of several. Only
-    changes smaller than `most` are returned, a size as of `size_cost`.
+    changes whose `size_cost` is less than `most` are returned.
     """
     yield from of_one_key(search, most)
     if most >= min(2, len(search.remedy.variables)):

@@ -364,7 +364,7 @@ class _Session:
                 self.tries(remedy)
 
     def _combines(self, remedy: Remedy) -> bool:
-        """Tell whether a remedy only combines others that work alone.
+        """Tell whether a remedy only combines other remedies that work alone.
 
         Its variables are then those of at least two of them together.
         """

@@ -47,7 +47,7 @@ class Moves:
 
 
 def quantile(values: np.ndarray, share: float) -> np.ndarray:
-    """Return for each row its least value that is not below a fraction `share` of the row."""
+    """Return for each row the least value that a fraction `share` of the row does not exceed."""
     ordered = np.sort(values, axis=-1)
     return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
 

@@ -14,7 +14,7 @@ from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
 KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
-"""Function from the flat keys so far and the values of a variable to the keys that change."""
+"""Function that takes the keys so far, in SI, and values of a variable, and returns the keys that change."""
 
 BANDWIDTH = "bandwidth"
 """Name of the variable that makes the whole controller faster."""

@@ -52,7 +52,7 @@ IN_SHORT: Mapping[Verdict, str] = {
     "transient": "does not hunt",
     "settles": "does not hunt",
 }
-"""Words for the verdict on a case before its margin is known."""
+"""Words for the verdict on a stage before its margin is known."""
 
 ONE_PLACE = 1.01
 """Ratio of the ends of a window of bandwidths below which its centre and width are stated instead."""
@@ -309,7 +309,7 @@ def _or_more(kick: Kick) -> str:
 
 
 def _outlook(case: Case) -> list[str]:
-    """Say at which bandwidths hunting begins, for a stage that need not hunt."""
+    """Say at which other bandwidths the stage hunts, or that none was found."""
     judgement = case.judgement
     says: list[str] = []
     if judgement.margin:
@@ -321,7 +321,7 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _unsearched(case: Case) -> list[str]:
-    """Say that the search through the bandwidths was stopped, if it was."""
+    """Say that the search for hunting at other bandwidths was stopped, if it was."""
     if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
@@ -375,13 +375,13 @@ def _elsewhere(case: Case) -> str | None:
 
 
 def _windows(case: Case) -> list[str]:
-    """Say at which other bandwidths hunting attracts."""
+    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again."""
     places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
 def _window(case: Case, window: BandwidthWindow) -> str:
-    """Write the range of a window of bandwidths."""
+    """Write a range of bandwidths, beyond the edge of hunting, in which the stage hunts again."""
     low, high = window.low, window.high
     if low and high and high.inside < low.inside * ONE_PLACE:
         width = percent(high.inside / low.inside - 1)

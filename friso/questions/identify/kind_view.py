@@ -69,15 +69,15 @@ VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIE
 
 
 def view_of(kind: str) -> KindView[Any]:
-    """Return the view of a kind of experiment.
+    """Return how to show the results of a kind of experiment.
 
-    A kind without a view of its own is shown by its estimates and its logs.
+    A kind that declares nothing is shown by its estimates and its logs.
     """
     return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
 
 
 def _by_estimates(kind: str) -> KindView[Any]:
-    """Return a view of estimates and logs, for a kind that declares no view."""
+    """Return how to show a kind that declares nothing: by its estimates and its logs."""
 
     def facts(result: Any) -> Facts:
         """List the estimates with their intervals."""

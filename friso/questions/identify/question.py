@@ -250,7 +250,7 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys of tables that a stage file lacks, as filled in by a stage `made` from logs.
+    """List the keys of tables that a stage file lacks, which a stage `made` from logs supplies.
 
     Keys that the user sets are left out.
     """

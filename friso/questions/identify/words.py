@@ -151,7 +151,7 @@ def missing(estimates: Sequence[Estimate]) -> str:
 
 
 def prediction_view(prediction: Prediction) -> PredictionView[Any]:
-    """Return the view of a prediction, as declared by the kind of experiment that predicts."""
+    """Return how to show a prediction, as its kind of experiment declares."""
     view = view_of(prediction.kind).prediction
     assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
     return view

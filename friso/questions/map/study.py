@@ -210,7 +210,7 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
     """Refuse to write over anything but earlier results of this study.
 
-    `beside` is the example of the refusal if figure and page are written beside the store. Raises InputError for
+    If figure and page are written beside the store, `beside` is the example that a refusal shows. Raises InputError for
     foreign files, and StoreError for a store with another study.
     """
     from friso.studies.metadata import is_store

@@ -54,6 +54,7 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
     """Describe a run that is off its reference at the end but does not swing.
 
     In its last quarter it `moved` [m] and was off by at most `farthest` [m]. At the end it is off by `final` [m].
+    `grows` is true if it is ever farther off.
     """
     if grows:
         return (

@@ -625,7 +625,7 @@ def _windows(outcome: RemedyOutcome) -> list[str]:
 
 
 def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
-    """Yield what was not tried because friction is too small, if the stage has any.
+    """Yield what was not tried because friction is too small; nothing without friction.
 
     Settings against friction need a break-away force, and an isolator needs friction that holds the cart.
     """

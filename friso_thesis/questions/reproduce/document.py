@@ -119,7 +119,7 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _space(space: ClaimInSpace) -> dict[str, Any]:
-    """Return in how many draws of the values that the thesis leaves open a claim holds, and why."""
+    """Return for how many random choices of the open values a claim holds, and why."""
     return {
         "draws": space.draws,
         "undecided": space.undecided,

@@ -60,7 +60,7 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say in how many draws of the values left open a claim holds, with the fraction's interval."""
+    """Say for how many random choices of the open values a claim holds, with an interval."""
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -69,7 +69,7 @@ def share(verdict: ClaimVerdict) -> str:
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
-    """Say in how many draws of the values left open one of several criteria is met.
+    """Say for how many random choices of the open values one of several criteria is met.
 
     The text is empty for a claim with one criterion, whose fraction is stated with the claim.
     """
@@ -167,9 +167,9 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Say which draw of the values left open fits the numbers printed in the thesis best.
+    """Say which random choice of the open values fits the numbers printed in the thesis best.
 
-    friso's own choice counts as a draw. The sentence also says which numbers these are.
+    friso's own choice counts too. The sentence also says which numbers these are.
     """
     fit = plausible.fit
     if fit is None:
@@ -191,7 +191,7 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """Return rows of the printed numbers beside the numbers of the best draw."""
+    """Return rows of numbers printed in the thesis, beside those of the best open values."""
     if plausible.fit is None:
         return []
     return [

@@ -143,7 +143,7 @@ def _other_changes(result: CycleComparison) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw Fig. 27, the maps of rails, cycles over asymmetry of friction, and friction levels."""
+    """Draw Fig. 27, maps over kinds of rails, cycles on lopsided rails, and friction levels."""
     result: CycleComparison = outcome.result
     if not result.even.swings[0]:
         return [_cycles(result)]

@@ -51,7 +51,7 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """Simulate the first samples that have an edge, at most `most`.
+    """Simulate at most so many samples (`most`), of those that have an edge, below and above it.
 
     The samples are in random order.
     """

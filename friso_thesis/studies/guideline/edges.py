@@ -195,7 +195,7 @@ class _Search:
 
     @property
     def jumps(self) -> np.ndarray:
-        """Return where the unstable cycle just above is another than the one that attracts below."""
+        """Return at which edges another cycle takes over, so that cycles above and below differ."""
         meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
         return np.isfinite(self.outside) & ~meets
 

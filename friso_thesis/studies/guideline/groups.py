@@ -160,7 +160,10 @@ GroupValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class GroupScale:
-    """Units that the groups leave open: a mass [kg], a stiffness [N/m] and a force [N]."""
+    """A mass [kg], a stiffness [N/m] and a force [N], which dimensionless groups leave open.
+
+    With them, a stage follows from its groups.
+    """
 
     mass: float = 1.0
     stiffness: float = 1.0
@@ -168,7 +171,7 @@ class GroupScale:
 
     @property
     def rate(self) -> float:
-        """Return the natural frequency [rad/s] of the mass on its bristles, the crossover's unit."""
+        """Return the natural frequency [rad/s] of the mass on its bristles, the unit of crossovers."""
         return float(np.sqrt(self.stiffness / self.mass))
 
 

@@ -68,7 +68,7 @@ Combine = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 locked edge, (count,). It returns the logarithm of the edge and its derivatives by the logarithms of the rates."""
 
 Exponent = tuple[int, str]
-"""The number of a rate and a group."""
+"""An exponent to be fitted: the index of a frequency (rate) of the law, and the group."""
 
 
 @dataclass(frozen=True)
@@ -273,16 +273,16 @@ _FRICTION = ("gap", "bristle_damping", "viscous")
 _JOINT = ("stage_share", "joint_damping", "limiter_damping", "stribeck")
 
 SLIP = Rate("slip", {"stribeck": 1.0, "gap": 1.0}, (*_TUNING, *_FRICTION))
-"""The rate sigma_0 v_s/F_s."""
+"""Frequency at which the bristles slip, sigma_0 v_s/F_s."""
 
 DROP = Rate("drop", {"stribeck": -1.0}, (*_TUNING, *_FRICTION))
-"""The rate (F_s - F_c)/(m v_s)."""
+"""Frequency at which falling friction drives the mass away, (F_s - F_c)/(m v_s)."""
 
 JOINT = Rate("joint", {"joint": 0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""The rate sqrt(k_j/m)."""
+"""Natural frequency of the joint, sqrt(k_j/m)."""
 
 STROKE = Rate("stroke", {"joint": 0.5, "stroke": -0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""The rate sqrt(F_s/(m S_j))."""
+"""Natural frequency of a joint whose stroke just suffices, sqrt(F_s/(m S_j))."""
 
 LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(rates_in_series, 1.0))
 FREE_LAW = EdgeLaw((JOINT, STROKE), beside_locked)

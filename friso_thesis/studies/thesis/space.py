@@ -49,7 +49,7 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Tell whether another value may change the study's map."""
+        """Tell whether changing the value may change the study's map."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:
@@ -60,7 +60,7 @@ class OpenValue:
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether another value may change that part of the analysis or that experiment."""
+        """Tell whether changing the value may change that part of the analysis or that experiment."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 

@@ -44,7 +44,7 @@ class ClaimVerdict:
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement at friso's own choice of open values, and over their joint draws.
+        """Return the judgement, at friso's own choice of the open values and at random ones.
 
         A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
         open if it holds at friso's choice or in some draw, but not so often.
@@ -70,7 +70,7 @@ class ClaimVerdict:
 
     @property
     def dependence(self) -> str:
-        """Say in which fraction of the draws a claim holds, and on what that depends."""
+        """Say for which fraction of random open values a claim holds, and on what that depends."""
         if self.finding is None:
             return ""
         if self.space is None:
@@ -106,7 +106,7 @@ class ClaimVerdict:
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """Return the fraction of the joint draws in words."""
+    """Write for which fraction of the random choices of open values a claim holds."""
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 

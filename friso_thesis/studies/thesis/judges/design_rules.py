@@ -38,7 +38,7 @@ _RATIOS = np.geomspace(2.0, 80.0, 16)
 
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
 def rules_of_design(evidence: Evidence) -> Finding:
-    """Judge each design rule by the parameter maps, and the one on parasitic modes linearly."""
+    """Judge the design rules by maps of parameters, and the one on parasitic modes by margins."""
     rig = evidence.rig
     strokes = _stroke(evidence), _softer_needs_less_stroke(evidence)
     return Finding((_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig)))
@@ -158,9 +158,9 @@ def _gap(evidence: Evidence) -> Part:
 
 @cache
 def _locked_edge() -> str:
-    """Say up to which crossover the cycle of the locked rig attracts, with the mass of the rule.
+    """Say up to which crossover a cycle of the locked rig attracts, with the abstract's mass.
 
-    `friso check` gives the crossover.
+    It is computed as `friso check` does.
     """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"

@@ -73,7 +73,10 @@ def _ratios(dimension: str) -> tuple[float, float, float]:
 
 
 def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, float, float]) -> Finding:
-    """Judge the factors on the stiffnesses of wider and of longer leaves."""
+    """Judge by which factors wider leaves, and longer leaves, change three stiffnesses.
+
+    The stiffnesses are that of the drive, along the leaves, and along their width.
+    """
     words, settings = reading(), JudgeSettings.current()
     alike, larger = settings.negligible_share, settings.leaf_change_factor
     drive, along, across = wider

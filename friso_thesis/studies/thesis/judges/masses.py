@@ -13,7 +13,7 @@ from friso_thesis.studies.thesis.studies import STUDIES
 
 @judges("F15A", figure="15A", needs=("isolator-masses",))
 def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
-    """Judge whether nearly all pairs of masses behave as those at the thesis's marker."""
+    """Judge whether nearly all pairs of masses behave as the thesis's evaluation point does."""
     words = reading()
     cart, stage, moving, valid = verdict_table(evidence.maps["isolator-masses"], "masses.cart", "masses.stage")
     marker = STUDIES["isolator-masses"].marker

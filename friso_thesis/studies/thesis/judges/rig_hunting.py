@@ -230,7 +230,7 @@ _COMPARED = ("period", "swing")
 
 @judges("F28", figure="28", needs=(STANDSTILL,))
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
-    """Judge the standstill with the joint locked and free, and with more damping."""
+    """Judge whether the rig stands less still with its joint free, and what damping recovers."""
     return judged_standstill(evidence.experiments.standstill)
 
 
