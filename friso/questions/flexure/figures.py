@@ -18,7 +18,7 @@ DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 """Dashes by model: closed forms are dashed, so that both models are visible where they agree."""
 
 Smooth = Callable[[Array, Array, Array], Array]
-"""Function that interpolates: it takes positions, values there, and other positions, and returns the values at these."""
+"""Function that interpolates: from positions, values there, and other positions, it returns the values at these."""
 
 FINE = 101
 """Number of deflections along a drawn line."""
