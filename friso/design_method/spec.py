@@ -221,7 +221,10 @@ class SpecLeaves(Section):
     places in the stage file take precedence."""
 
     def space(self, name: str) -> tuple[float, float]:
-        """Return the least and the largest length, width or spacing [m]; a fixed one is both."""
+        """Return the least and the largest length, width or spacing [m].
+
+        A single value is the largest; the least is then a tenth of it.
+        """
         allowed: Interval = getattr(self, name)
         return (allowed.high / 10 if allowed.single else allowed.low), allowed.high
 

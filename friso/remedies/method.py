@@ -179,8 +179,8 @@ def tune(
     """Optimise and verify every remedy that the goal allows, or the remedies named in `chosen`.
 
     Machines are drawn with the `seed` and the `correlations` of uncertain keys. `budget` sets the size of the searches.
-    `begins` is called before the work starts, and `answered` with the outcome of the first remedy. Raises InputError
-    for a motion after which nothing has to settle.
+    `begins` is called before the work starts. `answered` is called with the outcome of a changed bandwidth alone, if
+    that is tried first. Raises InputError for a motion after which nothing has to settle.
     """
     settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()

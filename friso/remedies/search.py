@@ -48,11 +48,11 @@ class TriedPoints:
     """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for 95 % of the machines: within the tolerance, within the looser one, and with the bandwidth lower
-    by the distance from hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The
-    bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1, grows
-    with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
-    machines settle; infinite if the largest move does not settle.
+    times [s] hold for 95 % of the machines. They are `settling` within the tolerance, `looser` within a looser one, and
+    `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest force [N] and least
+    modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the stage file's machine, where its loop
+    last crosses 0 dB. `nearness`, from 0 to 1, grows with the number of machines that settle or nearly settle.
+    `moves_from` [m] is the smallest move from which all machines settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -294,9 +294,9 @@ class Search:
         Moves are simulated only if the loop is stable with half of the margin required. A remedy of several variables
         must also not exceed the bandwidth limit by far. Other moves chatter and take most of the work.
 
-        A point is nearer to settling the more machines settle within the tolerance, the looser one, and the tolerance
-        at the lower bandwidth. So progress shows before any machine is in position. A point is stopped as soon as it
-        must cost more than `most`. The machines that are slowest most often are tried first.
+        A point is nearer to settling the more machines settle: within the tolerance, within the looser one, and within
+        the looser one at the lower bandwidth. So progress shows before any machine is in position. A point is stopped
+        as soon as it must cost more than `most`. The machines that are slowest most often are tried first.
         """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
@@ -345,9 +345,9 @@ class Search:
         return so_far()
 
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-        """Return the points of a batch that break no constraint on any machine, the best first.
+        """Return the settings of a batch that meet the goal once all machines were run.
 
-        The best settle soonest, or have the least `wanted`.
+        The best come first: they settle soonest, or have the least `wanted`.
         """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
@@ -358,7 +358,10 @@ class Search:
         return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
-        """Tell with which settings, (points, variables), no machine hunts; the shape is (points,)."""
+        """Tell with which settings, (points, variables), the surveyed machines do not hunt.
+
+        The result has shape (points,). A fraction `goal.share` of these machines must be quiet.
+        """
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         least = self.goal.share

@@ -272,7 +272,7 @@ def _number(result: OptionResult, count: int) -> str:
 
 
 def _cost(result: OptionResult, comparison: Comparison) -> str:
-    """Write the force and the modulus margin of an option, beside those of option a, the first."""
+    """Write an option's force over that of option a, the first, and its modulus margins."""
     if result is comparison.results[0]:
         return ""
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
