@@ -62,7 +62,7 @@ def edges_over(
     progress: Progress = silent,
     label: str = "",
 ) -> Corners:
-    """Find the edge of hunting of a stage at each machine of a population, by van Dijk's rules.
+    """Find the edge of hunting of a stage by van Dijk's rules, for each machine of a population.
 
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts, then refines between
     that point and the one above. `label` names the search to the progress.

@@ -72,7 +72,7 @@ class Modal:
 
     @property
     def comfortable(self) -> tuple[Range, ...]:
-        """Return the crossovers [Hz] with a modulus margin of 0.5."""
+        """Return the crossovers [Hz] with a modulus margin of at least 0.5."""
         settings = FrequencySettings.current()
         return ranges_below(
             np.geomspace(*searched_crossovers(self.flat), settings.crossover_steps), lambda at: WANTED - self.margin(at)

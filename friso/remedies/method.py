@@ -120,7 +120,7 @@ class Advice:
     def working(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that work, the smallest change first.
 
-        Leaf springs follow the remedy whose joint they make.
+        Leaf springs that make the joint of a remedy are no remedies of their own.
         """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=self.size))

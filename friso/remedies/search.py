@@ -386,7 +386,7 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """Yield the best settings, as points of shape (variables,), with which no machine hunts.
+        """Yield the best settings, as points of shape (variables,), that pass `clear`.
 
         Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
         meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
@@ -536,7 +536,7 @@ def _evolve(
 
 
 def _agree(intermediate_result: Any) -> bool:
-    """Tell whether SciPy's search may stop: all points meet the constraints and are as good.
+    """Tell whether SciPy's search may stop: all points meet the constraints, at similar cost.
 
     Points that break constraints may all be equally bad; the search must then go on.
     """

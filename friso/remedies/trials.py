@@ -56,7 +56,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """Simulate the moves of machines at points of a search, with all settings of each point.
+    """Simulate the moves of all machines with the settings of each point of a search.
 
     `shares`, (points, variables), are coordinates from 0 to 1 over the remedy's ranges. The bandwidth is lower by the
     factor `slower`. `rtol` is the solver's relative tolerance.

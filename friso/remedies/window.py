@@ -33,7 +33,7 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     """Return in which range each variable works, the others staying at a point, (variables,).
 
     Moves and margins are tried on a grid on the machines of the search. The ends are refined by bisection, then drawn
-    in until no machine hunts there. The result is empty if the point itself misses the goal on these machines, or if
+    in until they pass `Search.clear`. The result is empty if the point itself misses the goal on these machines, or if
     this takes too much work.
     """
     settings = RemedySettings.current()
@@ -101,7 +101,7 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether no machine hunts at points that each have one variable moved, shape (n,).
+    """Tell which points, each with one variable moved, pass `Search.clear`, shape (n,).
 
     `numbers` (n,) are the indices of the variables, and `places` (n,) their new coordinates from 0 to 1.
     """

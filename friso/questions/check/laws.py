@@ -166,8 +166,8 @@ def laws_columns(laws: VerdictsByLaw) -> list[str]:
 def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
     """Return the rows of the table with one column per law.
 
-    Verdict, amplitude and edge come first, with the joint as given, locked and free. Then follows what was varied and
-    what is not reproduced.
+    Verdict, amplitude and edge come first, with the joint as given, locked and free. Then follow what was varied, what
+    is not reproduced, and where the law is passive.
     """
     rows = []
     for case, label in case_labels(laws.stage).items():

@@ -103,7 +103,8 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 def conclusion(cases: Mapping[str, Case]) -> str | None:
     """Say what the joint does to the hunting.
 
-    Returns None unless the verdicts with the joint locked and free are both certain.
+    Returns None if the stage hunts neither with its joint locked nor with it free, or if one of the two verdicts is not
+    certain.
     """
     both = [cases[key] for key in ("locked", "free") if key in cases]
     words = [case.verdict for case in both]

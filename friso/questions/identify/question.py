@@ -71,7 +71,10 @@ class IdentifyAnswer(Answer):
         return "a model does not describe its log" if self.result.failed else ""
 
     def sentences(self) -> Sequence[str]:
-        """Return what was identified, how well other logs are predicted, and notes."""
+        """Return what was identified, how well other logs are predicted, and notes.
+
+        The sentences of a check follow, if the identified stage was checked.
+        """
         from friso.questions.identify.words import sentences
 
         verdicts = [] if self.checked is None else self.checked.sentences()

@@ -270,7 +270,7 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
-    """Align quantity, value and interval in columns; a missing value is replaced by the reason."""
+    """Align quantity, value and interval in columns; how they were determined is left out."""
     table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

@@ -615,7 +615,7 @@ def window_lines(tuning: Advice) -> list[str]:
 
 
 def window_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Return the ranges in which the numbers of every remedy work."""
+    """Return the ranges in which the numbers of every working remedy work."""
     return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
 
 

@@ -147,7 +147,7 @@ def _steps(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _slow(experiments: Experiments) -> dict[str, Figure]:
-    """Draw a slow motion over time: position, velocity and force."""
+    """Draw a slow motion over time: position, deflection of the joint, and velocity of the cart."""
     run = experiments.slow_motion[len(experiments.slow_motion) // 2]
     log = run.log
     cart = log["cart_position"]

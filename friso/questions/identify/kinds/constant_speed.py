@@ -32,7 +32,7 @@ from friso.shown.drawing.figure import (
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:
-    """List friction over speed by direction, the constant force, and friction along the rail."""
+    """List friction over speed, by direction and for both, and friction along the rail."""
     facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
     facts += [
         ("Friction, both directions", _direction_text(result.velocity.both)),

@@ -196,7 +196,10 @@ def _crossovers(moves: HuntingResult) -> Figure:
 
 
 def _shares(moves: HuntingResult) -> Figure:
-    """Draw the fraction of rails with counted peaks over the crossover, with its interval."""
+    """Draw the fraction of rails with counted peaks over the crossover.
+
+    The interval of the fraction is drawn for the locked joint only.
+    """
     bands, lines = [], []
     for case, colour in COLOURS.items():
         shares = moves.shares(case)

@@ -110,5 +110,5 @@ def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Find
 
 
 def _listed(of: Mapping[str, float], order: list[str]) -> str:
-    """Return the parameters with their correlations, the most decisive first."""
+    """Return the four most decisive parameters with their correlations, the most decisive first."""
     return ", ".join(f"{key} {of[key]:+.2f}" for key in order[:4])
