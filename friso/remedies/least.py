@@ -82,8 +82,9 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield changes of a single variable that work, the smallest first, all smaller than `most`.
 
-    They break no constraint and pass `Search.clear`, and the fraction `enough` of the fresh machines meets the goal.
-    With `enough`, values between grid points are not tried, so the first answer has a reserve.
+    They break no constraint, the fraction `enough` of the fresh machines meets the goal, and enough surveyed machines
+    do not hunt (`Search.clear`). With `enough`, values between grid points are not tried, so the first answer has a
+    reserve.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -107,10 +108,11 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
 
 
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Yield the points (points, variables) that work on fresh machines and pass `Search.clear`.
+    """Yield the points (points, variables) that work on fresh machines, without hunting.
 
-    At least the fraction `enough` of these machines must meet the goal by moves and margins. By default, it lies one
-    standard error above the fraction required of all machines.
+    Enough surveyed machines must not hunt (`Search.clear`). At least the fraction `enough` of the fresh machines must
+    meet the goal by moves and margins. By default, it lies one standard error above the fraction required of all
+    machines.
     """
     settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough

@@ -386,12 +386,12 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """Yield the best settings, as points of shape (variables,), that pass `clear`.
+        """Yield the best settings with which enough surveyed machines do not hunt (see `clear`).
 
-        Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
-        meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
-        farther away, because the best points are often at the limit of what works. If no point has enough fresh
-        machines, the one with the most is yielded.
+        Settings are points of shape (variables,). Points that settle soonest, or have the least of the quantity
+        `wanted`, come first. Enough fresh machines must meet the goal. Nearly equal points count as one. After a batch
+        without success, the next points are taken farther away, because the best points are often at the limit of what
+        works. If no point has enough fresh machines, the one with the most is yielded.
         """
         settings = RemedySettings.current()
         points = self.begun

@@ -33,8 +33,8 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     """Return in which range each variable works, the others staying at a point, (variables,).
 
     Moves and margins are tried on a grid on the machines of the search. The ends are refined by bisection, then drawn
-    in until they pass `Search.clear`. The result is empty if the point itself misses the goal on these machines, or if
-    this takes too much work.
+    in until enough surveyed machines do not hunt there. The result is empty if the point itself misses the goal on
+    these machines, or if this takes too much work.
     """
     settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
@@ -101,9 +101,10 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell which points, each with one variable moved, pass `Search.clear`, shape (n,).
+    """Tell at which points enough surveyed machines do not hunt (`Search.clear`), shape (n,).
 
-    `numbers` (n,) are the indices of the variables, and `places` (n,) their new coordinates from 0 to 1.
+    Each point has one variable moved: `numbers` (n,) are the indices of the variables, and `places` (n,) their new
+    coordinates from 0 to 1.
     """
     if not len(places):
         return np.ones(0, bool)

@@ -76,8 +76,8 @@ def _mirrored(hunting: Hunting) -> bool:
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
     """Return strips of distances, up to `reach` [m], from which a stage ends in hunting.
 
-    The return map leads from the `distances` at which the stage sticks to its `returns` [m] on the other side. It is
-    followed over many swings, and must be the same on both sides.
+    From sticking at one of the `distances`, the stage next sticks at one of the `returns` [m] on the other side. Both
+    sides must behave alike. These returns are followed over many swings.
     """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts

@@ -128,7 +128,7 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """Return what the search for the edge may miss, margins of the joint, and doubts on friction.
+        """Return what the search for the edge may miss, joint margins, and a doubt on friction.
 
         The doubt is that a friction law may give energy back, which no friction does.
         """

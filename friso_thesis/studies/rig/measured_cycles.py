@@ -205,8 +205,8 @@ def started(
 ) -> RailRuns:
     """Return how runs of `count` machines end, shape (count,).
 
-    `changes` are their keys. Each machine takes the first of several starts after which it keeps swinging, or else the
-    move.
+    `changes` are their keys. Each machine is run from the move and from several other starts; the first run that keeps
+    swinging counts, or else the run from the move.
     """
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]

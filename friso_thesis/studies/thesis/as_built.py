@@ -124,8 +124,7 @@ class CyclesOnRails:
 def _prescribed(stage: Stage) -> Stage:
     """Return the rig with its drive, moved as Sec. 4.3.2 prescribes: by 100 mm at 100 m/s^2.
 
-    `move` takes the acceleration from this path, and rounds its 90 mm to 100 mm. The simulation's own path does not
-    matter.
+    The path written here is 90 mm long; `move` takes its acceleration and rounds the length to 100 mm.
     """
     time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
     own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}

@@ -172,9 +172,9 @@ class Draw:
 
 
 def draw(number: int) -> Draw:
-    """Return the random choice of all open values with a number, from 0 on.
+    """Return one random choice of all open values, identified by a number from 0 on.
 
-    Its values are independent of each other, and of other numbers.
+    The values are independent of each other, and of choices with other numbers.
     """
     shares = np.random.default_rng([SEED, number]).random(len(OPEN))
     return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})

@@ -128,7 +128,7 @@ def _numbers(bench: Bench) -> dict[str, Any]:
 
 
 def _line_numbers(line: StraightLine) -> dict[str, Any]:
-    """Return a straight line, for the document."""
+    """Return a straight line fitted to a frequency response, for the document."""
     band = {"kind": line.kind, "low_hz": line.low, "high_hz": line.high, "sign": line.sign}
     return {**band, "level": estimate_document(line.level), "value": estimate_document(line.value)}
 
