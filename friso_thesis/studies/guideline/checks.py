@@ -51,7 +51,7 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """Simulate at most so many samples (`most`), of those that have an edge, below and above it.
+    """Simulate samples that have an edge of hunting, below and above it; at most `most` of them.
 
     The samples are in random order.
     """
