@@ -24,8 +24,8 @@ LENGTH, FORCE, MASS = "m", "N", "kg"
 class AxisKind:
     """A kind of axis: its name, and its units in place of metre, newton and kilogram.
 
-    If the motor is known, `per_ampere` [N, or N m] is what an ampere exerts, by which forces may be written in
-    amperes.
+    `per_ampere` is the force or torque of the motor per ampere [N, or N m], if it is known. Forces may then be written
+    in amperes.
     """
 
     name: str
@@ -41,7 +41,7 @@ class AxisKind:
 
     @property
     def plain(self) -> bool:
-        """Tell whether units are those of a linear axis, in which everything is declared."""
+        """Tell whether its units are those of a linear axis, in which everything is declared."""
         return (self.length, self.force) == (LENGTH, FORCE)
 
     def per(self, unit: str) -> AxisKind:
@@ -103,7 +103,7 @@ KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
 
 
 def axis_of(flat: Mapping[str, Any]) -> AxisKind:
-    """Return the kind of axis of a stage given as flat keys."""
+    """Return the kind of axis of a stage, from its keys."""
     return KINDS[flat.get(AXIS_KIND, LINEAR.name)]
 
 

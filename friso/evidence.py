@@ -19,13 +19,12 @@ from importlib.resources import files
 class Entry:
     """A finding: its subject, its values, and the command that computes them.
 
-    `about` says what it is, `values` stand by name (the unit in the name's suffix), and `command` computes them.
-
-    `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with, and
-    `code` the digest (`benchmarks.code_digest`) of the modules that it `rests_on` besides: criteria, methods and
-    experiments, as paths of folders and files from the package friso (an empty `code`: it was computed before there
-    were digests). `stated` holds, per document of the repository, the phrases that state the finding there. `note`
-    says where the values come from when the command did not write them itself.
+    `about` says what it is. `values` are numbers by name, with the unit as suffix, and `command` computes them.
+    `computed` is the day, and `equations` the revision of the equations, in `evidence.toml`, that was used. The finding
+    also `rests_on` modules for criteria, methods and experiments, given as paths from the package friso. `code` is
+    their digest (`benchmarks.code_digest`); it is empty if the finding is older than digests. `stated` has, for each
+    document, the phrases that state the finding. `note` says where the values come from if the command did not write
+    them itself.
     """
 
     name: str
@@ -49,7 +48,7 @@ class Entry:
 class Equations:
     """A revision of the equations: its number, its day, and reference numbers.
 
-    The reference numbers (`benchmarks.canonical`), by stage and output [SI], distinguish it from other revisions.
+    The reference numbers (`benchmarks.canonical`), by stage and output [SI], differ from those of other revisions.
     """
 
     revision: int

@@ -33,7 +33,10 @@ A key that takes whole numbers fails the test."""
 
 @dataclass(frozen=True)
 class Interval:
-    """From `low` to `high`, SI, both included; `text` is what the user wrote, `form` the notation used."""
+    """A range from `low` to `high` in SI, both included.
+
+    `text` is what the user wrote, and `form` the notation: a range, a tolerance, or a single value.
+    """
 
     low: float
     high: float
@@ -127,10 +130,10 @@ def is_range(value: Any) -> bool:
 
 
 def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
-    """Return the uncertain value of a text that `is_range`. Raises InputError.
+    """Return the uncertain value of a text with the notation of a range. Raises InputError.
 
-    All of a range "LOW .. HIGH" must be allowed. Of "VALUE +/- HALF" only the value must be: a normal distribution has
-    no ends, and draws are cut off at the bound.
+    The key must allow both ends of "LOW .. HIGH". Of "VALUE +/- HALF" it need only allow the value: a normal
+    distribution has no ends, and draws are cut off at the bound.
     """
     try:
         centre, interval = _read(text, of)

@@ -98,9 +98,9 @@ class Bound:
     test: Callable[[Any], Any]
 
     def holds(self, value: Any) -> Any:
-        """Tell whether a value is allowed and no larger than any machine has it.
+        """Tell whether a value, a number or an array, is allowed.
 
-        `value` is a number or an array.
+        Numbers larger than any machine has are not.
         """
         return (abs(value) <= LARGEST) & self.test(value)
 
@@ -150,7 +150,7 @@ class Quantity:
     motor: Motor | None = field(default=None, kw_only=True)
 
     def on(self, kind: AxisKind) -> Self:
-        """Return the declaration of the key on an axis of that kind."""
+        """Return the declaration of the key for an axis of this kind, with its units."""
         motor = None if kind.per_ampere is None else Motor(kind.per_ampere, kind.force)
         motor = None if self.unit.endswith("/A") else motor
         if (unit := kind.unit(self.unit)) == self.unit:
@@ -421,7 +421,7 @@ def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
 
 
 def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
-    """Tell whether a unit per angle lacks the radian: N m for N m/rad."""
+    """Tell whether a unit lacks "per radian" to be of the right kind: N m for N m/rad."""
     return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
 
 
@@ -448,9 +448,9 @@ def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:
 
 
 def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:
-    """Return the factor for frequencies, for which pint takes 1 Hz to be 1 rad/s.
+    """Return the factor of a frequency to Hz; `pint` alone takes 1 Hz for 1 rad/s.
 
-    They are distinguished here. A plain 1/s could be either and is refused.
+    A plain 1/s could be either and is refused with _Refused.
     """
     if root == {"radian": 1, "second": -1}:
         return factor / (2 * math.pi)

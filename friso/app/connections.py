@@ -34,12 +34,12 @@ OUT_OF_FILES = (
 class Connection(H11Protocol):
     """A connection that is closed when idle too long, or when held too long without a key.
 
-    If all places are taken, the connection that has been idle longest is closed for a new one. A connection that
+    Only so many may be open. For one more, the connection that has been idle longest is closed. A connection that
     answers a client with a key is never closed.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a place; if all are taken, abort the connection that has been idle longest."""
+        """Begin the connection; if too many are open, abort the one that has been idle longest."""
         super().connection_made(transport)
         self._since, self._timer = self.loop.time(), self.loop.call_later(HEADERS, self._look)
         held = [one for one in self.connections if isinstance(one, Connection) and not one.transport.is_closing()]
@@ -48,7 +48,7 @@ class Connection(H11Protocol):
             min(resting, key=lambda one: one._since).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the timer and give the place back."""
+        """Stop the timer of a connection that has ended."""
         self._timer.cancel()
         super().connection_lost(exc)
 

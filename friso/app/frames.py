@@ -1,7 +1,7 @@
 """Pack answers for the page: frames of a JSON text and of its numbers in binary.
 
 A frame begins with two whole numbers of four bytes, least significant byte first. They are the lengths of the text and
-of the numbers, which follow. In the text, an array is an object {"array": place of its first byte, "shape": [...]}.
+of the numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}.
 Arrays are float32.
 """
 
@@ -51,7 +51,7 @@ class _Arrays:
         self.size = 0
 
     def add(self, numbers: bytes) -> int:
-        """Add an array and return the place of its first byte."""
+        """Add an array, and return the index of its first byte among the numbers."""
         place, self.size = self.size, self.size + len(numbers)
         self.parts.append(numbers)
         return place

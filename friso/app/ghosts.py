@@ -62,7 +62,7 @@ def _subject(panel: Panel) -> tuple[str, str, str]:
 
 
 def with_edge(figure: Figure, edge: Answer | None) -> Figure:
-    """Add to a map over two keys the curves on which hunting ends."""
+    """Add to a map over two keys the curves on which hunting ends; None adds nothing."""
     if edge is None:
         return figure
     curves = edge.figures()[0].panels[0].series

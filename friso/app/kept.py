@@ -21,7 +21,7 @@ MOST = 4
 
 
 class KeptAnswers:
-    """Answers of friso's functions about machines, with the notes on each.
+    """Answers of friso's functions about machines, with the warnings that came with each.
 
     Only the latest answers are kept. Several threads may use the object.
     """
@@ -35,7 +35,7 @@ class KeptAnswers:
     ) -> Any:
         """Return a function's answer about a machine, computed now or kept from before.
 
-        The notes on a kept answer are added to the work again. Raises whatever the function raises.
+        The warnings that came with a kept answer are added to the `work` again. Raises whatever the function raises.
         """
         place = _place(machine, options)
         with self._turn:

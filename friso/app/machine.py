@@ -23,8 +23,8 @@ REACH = 10.0
 class Machine:
     """A stage file by its text and name, and the keys changed on the page.
 
-    `changed` holds the changes as JSON, in which null removes a key. `made` says that the machine was made on the page,
-    so that no file has its text.
+    `changed` holds the changes as JSON, in which null removes a key. `made` is true if the machine was made on the
+    page, so that no file has its text.
     """
 
     text: str
@@ -34,7 +34,10 @@ class Machine:
 
     @classmethod
     def of(cls, data: Any) -> Machine:
-        """Return the machine that a page sent. Raises InputError for data of any other form."""
+        """Return the machine that a page sent, a stage file's text and changed keys.
+
+        Raises InputError for data of any other kind.
+        """
         if not isinstance(data, Mapping) or not isinstance(data.get("text"), str):
             raise InputError("machine", type(data).__name__, "the text of a stage file, and the keys changed")
         changes = data.get("changes") or {}
@@ -125,13 +128,13 @@ def machine_on_page(machine: Machine) -> dict[str, Any]:
 
 
 def _variant(node: Mapping[str, Any], present: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the form of a table that the stage file uses.
+    """Choose, among the schemas that a table may have, the one that the stage file uses.
 
-    The form has all keys that are present, and allows the kind or model that is written.
+    `node` is the schema of the table, and `present` its keys in the file.
     """
 
     def fits(form: Mapping[str, Any]) -> bool:
-        """Tell whether a form of the table allows all that is written."""
+        """Tell whether a schema has all keys of the table, and allows its `kind` or `model`."""
         keys = form["properties"]
         words = (present.get(key) in item["enum"] for key, item in keys.items() if key in ("kind", "model"))
         return all(words) and all(key in keys for key in present)

@@ -58,10 +58,7 @@ class PageRequest:
 
     @classmethod
     def of(cls, data: Mapping[str, Any], uploads: Uploads) -> PageRequest:
-        """Read a request from the JSON that a page sent.
-
-        Raises InputError for data of any other form.
-        """
+        """Read a request from the JSON that a page sent. Raises InputError for any other data."""
         options = data.get("options") or {}
         if not isinstance(options, Mapping):
             raise InputError("options", type(options).__name__, "options by name")
@@ -162,7 +159,10 @@ def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the error of the run that a cell of a map stands for."""
+    """Yield how far the run of a map's cell deviates from its reference, and what it does.
+
+    The machine of the request is that of the cell.
+    """
     asked.chosen()
     ghosts = _ghosts(asked, work, friso.simulate)
     answer = friso.simulate(asked.machine.stage)
@@ -173,9 +173,9 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the verdict on each case in one word, from its attractors.
+    """Yield the verdict in one word, for the joint locked and free if the stage has one.
 
-    The verdict is computed as a map of one cell, or of two cells for the joint locked and free.
+    It follows from attractors, as in a map of one or two cells.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)
@@ -210,7 +210,7 @@ def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the Bode plots while a slider moves.
 
-    Figures that need no family of friction states come first.
+    First come the figures that need only the limit cases, not all states of friction.
     """
     asked.chosen()
     ghosts, lines = _ghosts(asked, work, friso.bode), _lines("bode", asked)
@@ -247,7 +247,7 @@ COARSE_TO_FINE = (6, 21, 41)
 
 
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield a map over two keys from coarse to fine, with the places of the machines in it.
+    """Yield a map over two keys from coarse to fine, with marks where the machines lie in it.
 
     If asked for, the edge of hunting is added last. A stage that cannot hunt gets a sentence instead.
     """
@@ -322,7 +322,10 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         return
 
     def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
-        """Return the boundary as the page shows it, with ghosts and machines."""
+        """Return the boundary as the page shows it, with the pinned machine's in grey.
+
+        In a plane of two keys, marks show where the machines lie.
+        """
 
         def drawn(figure: Figure) -> Figure:
             return with_places(ghosts(figure), _stands(asked), keys) if len(keys) == 2 else ghosts(figure)
@@ -475,7 +478,7 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
-    """Return the finest map.
+    """Return the map with the most cells, for its files.
 
     The edge of hunting belongs to the command boundary and is left out.
     """
@@ -553,7 +556,10 @@ def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
 def _both_lines(
     command: str, asked: PageRequest, files: list[str], options: Mapping[str, Any], of: str, function: str = ""
 ) -> AnswerPart:
-    """Return a command and its line of Python, with what they are about, and the question asked."""
+    """Return the shell command and the Python line that repeat the page's question.
+
+    `of` names in words what they apply to. The question's name and options are returned too.
+    """
     lines = {
         "command": command_line(command, files, options),
         "python": python_line(function or command, files, options),
@@ -562,12 +568,15 @@ def _both_lines(
 
 
 def _of(machine: Machine) -> str:
-    """Name the file that the lines are about."""
+    """Say to which file the shell command and the line of Python apply."""
     return "the stage file saved here" if machine.is_of_page else f"{machine.name} as it was opened"
 
 
 def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> Callable[[Figure], Figure]:
-    """Return a function that draws the pinned machine's answer behind a figure's lines."""
+    """Return a function that adds the pinned machine's lines, in grey, to a figure.
+
+    The pinned machine's answer is computed by `function`.
+    """
     if asked.pinned is None:
         return ghosts_of(None)
     pinned = KEPT.answer(function, asked.pinned, work)
@@ -576,13 +585,13 @@ def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> 
 
 
 def _stands(asked: PageRequest) -> list[tuple[str, Stage]]:
-    """Return the machines that a map marks, with their labels."""
+    """Return the machine shown and, if there is one, the pinned machine, with labels for a map."""
     pinned = [("pinned", asked.pinned.stage)] if asked.pinned else []
     return [(SHOWN, asked.machine.stage), *pinned]
 
 
 def _given(stage: Stage) -> str:
-    """Return the name of the case that the stage file describes."""
+    """Return the name of the case that the stage file describes: "given", "locked" or "free"."""
     return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
 
 
@@ -592,9 +601,9 @@ def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
-    """Return a key and the value that it has in each case.
+    """Return a key and, for each case, the value of this key: the joint locked or free.
 
-    The key locks or frees the joint. A stage without a joint has one case, set by its mass as given.
+    A stage without a joint has one case, "given". Its key is a mass, with its present value.
     """
     if stage.joint is not None:
         values = {"locked": True, "free": False}

@@ -34,10 +34,10 @@ PLOTLY = "/plotly.js"
 
 
 def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> ASGIApp:
-    """Build the server's application behind its gate.
+    """Build the web application of the page; all but its public files need a key.
 
-    `begin` holds name and text of the first stage file, and whether the user `asked` for it. The workshop is closed
-    when the server ends.
+    `begin` holds the name and text of the first stage file, and whether the user asked for that file. When the server
+    ends, questions in progress are stopped and uploads are deleted.
     """
     uploads = Uploads()
 

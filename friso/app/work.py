@@ -37,8 +37,8 @@ THREADS = 16
 class Work:
     """A question in progress.
 
-    `put` sends a part of its answer to the page. `number` orders the questions of a page. Another thread sets `flag` to
-    end the work.
+    `put` sends a part of its answer to the page. `number` is larger for later questions of a page. Another thread sets
+    `flag` to end the work.
     """
 
     put: Callable[[dict[str, Any] | None], object]
@@ -127,10 +127,9 @@ _IMPORTING = Lock()
 
 
 class Workshop:
-    """The questions in progress, one on every lane of a page.
+    """The questions in progress: on each page at most one of a kind, which is called a lane.
 
-    A newer question, which has a larger number, overtakes the older one on its lane. The order of arrival does not
-    matter.
+    A newer question, which has a larger number, ends the older one on its lane. The order of arrival does not matter.
     """
 
     def __init__(self) -> None:
@@ -143,8 +142,8 @@ class Workshop:
     ) -> AsyncIterator[bytes]:
         """Yield the frames of an answer as they come. The work ends when the reader stops.
 
-        A `quick` question computes nothing and does not wait for others. All others wait for the first part of a
-        question that goes `first`.
+        The question ends an older one of the `page` on this `lane`. A `quick` question computes nothing and does not
+        wait for others. All others wait for the first part of a question that goes `first`.
         """
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 
@@ -183,7 +182,7 @@ class Workshop:
             log.removeHandler(messages)
 
     def overtake(self) -> None:
-        """End all questions, and answer each at once, because computations may notice later."""
+        """End all questions in progress. Pages are answered at once, before computations notice."""
         for work in [*self.lanes.values()]:
             work.overtake()
             for part in ({"kind": "overtaken"}, None):

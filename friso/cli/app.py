@@ -75,7 +75,7 @@ class ByQuestion(TyperGroup):
 def command_line(*names: str, for_list: bool = False) -> typer.Typer:
     """Build the command line with the named commands, or with all of them.
 
-    Commands stand in the order of their places. With `for_list` they have no options, so that their functions need not
+    Commands stand in the order of their `place`. With `for_list` they have no options, so that their functions need not
     be imported.
     """
     app = typer.Typer(

@@ -34,10 +34,9 @@ class _Command(TyperCommand):
 class Command:
     """A command that asks no question.
 
-    The docstring of `function` is its help. `place` orders commands below their `topic` in `friso --help`.
-
-    Raises ValueError for a topic that is not one of TOPICS. Raises TypeError or NameError for a function whose options
-    typer could not read.
+    The docstring of `function` is its help. `place` orders the commands of a `topic` in `friso --help`. Raises
+    ValueError for a topic that is not one of TOPICS. Raises TypeError or NameError for a function whose options typer
+    could not read.
     """
 
     function: Callable[..., None]
@@ -71,7 +70,7 @@ class QuestionCommand:
 
     @property
     def place(self) -> float:
-        """Return the place of the command below its topic."""
+        """Return where the command stands among those of its topic; lower numbers come first."""
         return self.question.place
 
     @property

@@ -84,9 +84,9 @@ def _asked(question: Question) -> Iterator[Parameter]:
 
 
 def _kind_of(annotation: str) -> ArgumentKind | None:
-    """Return the kind of value that a parameter takes on the command line.
+    """Return how a parameter with this type `annotation` is read from the command line.
 
-    Returns None for a parameter without a form there.
+    Returns None for a parameter that only Python has.
     """
     kinds = [KINDS[part] for part in alternatives(annotation) if KINDS[part].command_type is not None]
     several = [kind for kind in kinds if kind.several]

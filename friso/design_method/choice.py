@@ -21,9 +21,10 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Confirmed:
-    """A candidate by the beam model: drive stiffness [N/m], first interfering frequency [Hz].
+    """Leaf springs of the front, by the beam model: drive stiffness [N/m] and frequency [Hz].
 
-    Both are NaN if the model could not be evaluated; `failure` gives the reason.
+    The frequency is that of the first mode that interferes with control. Both numbers are NaN if the model could not be
+    evaluated; `failure` gives the reason.
     """
 
     candidate: Candidate
@@ -34,10 +35,10 @@ class Confirmed:
 
 @dataclass(frozen=True)
 class ChosenLeaves:
-    """The geometry chosen, evaluated by the beam model, with its requirements.
+    """The leaf springs chosen, evaluated by the beam model, with their requirements.
 
-    `excess` is the factor by which it breaks each requirement by closed forms, at most 1. `passed_over` says why softer
-    geometries were not taken.
+    `excess` is the factor by which they break each requirement by closed forms, at most 1. `passed_over` says why
+    softer ones were not taken.
     """
 
     geometry: Geometry
@@ -48,9 +49,9 @@ class ChosenLeaves:
 
     @property
     def frequency(self) -> float:
-        """Return the first interfering frequency [Hz], the lower one of both models.
+        """Return the frequency [Hz] of the first mode that interferes with control.
 
-        Either model may miss a mode, where two modes hide each other.
+        It is the lower one of both models, since either may miss a mode where two modes hide each other.
         """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
@@ -86,7 +87,7 @@ def stays(task: LeafTask, by_beams: Evaluation) -> bool:
 
 
 def bears(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Tell whether, by the beam model, the leaves also bear bending and load."""
+    """Tell whether, by the beam model, the leaves withstand fatigue and buckling under load."""
     safety = task.spec.safety
     swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
     lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1
@@ -96,9 +97,9 @@ def bears(task: LeafTask, by_beams: Evaluation) -> bool:
 def _in_order(
     task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
-    """Yield geometries in whole sizes that meet the requirements by closed forms.
+    """Yield leaf springs in whole sizes that meet the requirements by closed forms.
 
-    The softest comes first.
+    The softest come first. Each comes with the factors by which it breaks the requirements, at most 1.
     """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
@@ -120,9 +121,9 @@ def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
 
 
 def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
-    """Evaluate evenly picked candidates of the front by the beam model.
+    """Evaluate some leaf springs of the front, evenly picked, by the beam model.
 
-    A candidate that the model cannot evaluate keeps the reason.
+    Where the model finds no solution, the result holds the reason.
     """
     settings = DesignSettings.current()
     for k in np.unique(np.linspace(0, len(candidates) - 1, settings.confirmed_candidates).astype(int)):

@@ -45,8 +45,9 @@ class Damping:
 class DesignedController:
     """Gains by van Dijk's rules at the chosen `crossover` [Hz].
 
-    `margin` is the least modulus margin in the settled states as designed. `corners` is the least margin at each
-    corner of the specification, shape (n,). `damping` tells what more damping of the joint would add.
+    `margin` is the least modulus margin as designed, over the limit cases and all states stuck under a bias force.
+    `corners` is that of each corner of friction and masses, shape (n,). `damping` shows what more damping of the joint
+    would add.
     """
 
     crossover: float
@@ -63,9 +64,10 @@ def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
 
 
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
-    """Return the crossovers [Hz] with a modulus margin of 0.5 in all settled states.
+    """Return the ranges of crossovers [Hz] in which the least modulus margin is at least 0.5.
 
-    They hold for the masses of the stage and for all masses in the population.
+    They hold for the limit cases and all states stuck under a bias force, for the stage's own masses and all masses in
+    the population.
     """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable
@@ -80,7 +82,7 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
 
 
 def choose_controller(stage: Stage, leaves: Evaluation, population: Population) -> DesignedController:
-    """Design the controller of a stage with leaf springs at its chosen crossover."""
+    """Return the gains and margins of a stage with leaf springs, at its chosen crossover."""
     flat = stage.flat()
     gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])

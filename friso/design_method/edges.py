@@ -1,4 +1,4 @@
-"""Find the edge of hunting over the corners of a specification.
+"""Find the edge of hunting over the corners of a specification, the ends of all its ranges.
 
 The edge is the highest crossover at which a stage hunts. It is located to 1 or 2 % in seconds, because a design
 simulates all its moves afterwards.
@@ -21,12 +21,12 @@ from friso.progress import Progress, silent
 
 @dataclass(frozen=True)
 class Corners:
-    """Corners of a specification with the edge of hunting of each.
+    """Extremes of friction and masses (corners), and the edge of hunting at each.
 
     `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts. It is 0 if it does not hunt from
-    `searched[0]` on, and infinite if it still hunts at `searched[1]`. In `unknown` corners the edge is not certain:
-    simulations below it failed or did not settle, which counts as hunting. Above it there may be attractors that no
-    simulation reached.
+    `searched[0]` on, and infinite if it still hunts at `searched[1]`. `unknown` counts the corners whose edge is not
+    certain. Either simulations below it failed or did not settle, which counts as hunting. Or something above it may
+    attract that no simulation reached.
     """
 
     population: Population
@@ -36,7 +36,7 @@ class Corners:
 
     @property
     def worst(self) -> int:
-        """Return the number of the corner that hunts up to the highest crossover."""
+        """Return the index of the corner that hunts up to the highest crossover."""
         return int(self.edges.argmax())
 
     @property
@@ -62,7 +62,7 @@ def edges_over(
     progress: Progress = silent,
     label: str = "",
 ) -> Corners:
-    """Find the edges of the stage `flat` in all corners, with van Dijk's tuning rules.
+    """Find the edge of hunting of a stage by van Dijk's rules, for each machine of a population.
 
     The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts, then refines between
     that point and the one above. `label` names the search to the progress.
@@ -90,9 +90,9 @@ def edges_over(
 
 
 def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
-    """Return in each corner the highest edge of hunting under several friction laws.
+    """Return at each corner of friction and masses the highest edge of hunting of all laws.
 
-    All laws must have been searched over the same corners and range.
+    All friction laws must have been searched over the same corners and range.
     """
     several = [*by_law.values()]
     edges = np.max([corners.edges for corners in several], axis=0)
@@ -101,10 +101,10 @@ def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
 
 @dataclass(frozen=True)
 class OtherLaws:
-    """The friction of stages converted to other laws, as flat keys by the name of the law.
+    """The friction of some stages under other laws: keys [SI] by the name of the law.
 
-    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that do not keep the measured
-    friction, each with the indices of the stages concerned.
+    Keys that differ between stages are arrays of shape (stages,). `lost` names the laws that cannot match the measured
+    friction of some stages, each with their indices.
     """
 
     frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -118,7 +118,10 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tell which corners hunt or may hunt at logarithms of crossovers, and how certainly."""
+    """Tell which corners hunt or may hunt at certain crossovers, and whether that is certain.
+
+    `which` are indices of corners, and `crossover` the logarithm of a crossover for each.
+    """
     settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
     attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)

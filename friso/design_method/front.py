@@ -1,6 +1,6 @@
-"""Find the Pareto front of drive stiffness and first interfering frequency of leaf springs.
+"""Find the Pareto front of leaf springs: soft ones whose modes interfere at high frequency.
 
-All leaf springs on it meet the requirements.
+All leaf springs on it meet the requirements. The frequency is that of the first mode that interferes with control.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from friso.leaf_springs.joint import first_interfering
 
 @dataclass(frozen=True)
 class Candidate:
-    """Leaf springs with their drive stiffness [N/m] and first interfering frequency [Hz].
+    """Leaf springs with their drive stiffness [N/m] and a frequency [Hz], by closed forms.
 
-    Both numbers come from closed forms.
+    The frequency is that of the first mode that interferes with control.
     """
 
     geometry: Geometry
@@ -33,7 +33,8 @@ class Candidate:
 def front(task: LeafTask) -> list[Candidate]:
     """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
 
-    It is empty if no geometry meets the requirements. The requirement on the frequency serves as an objective.
+    It is empty if no leaf springs meet the requirements. The requirement on the frequency of modes is left out, since
+    the search raises this frequency.
     """
     settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -72,16 +73,19 @@ def front(task: LeafTask) -> list[Candidate]:
 
 
 def _ends(task: LeafTask) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the largest variables, each of shape (4,).
+    """Return the least and the largest variables of the search, each of shape (4,).
 
-    They are the logarithms of the sizes, and the number of the sheet.
+    The variables are logarithms of the sizes, and the index of the sheet.
     """
     low, high = box(task.spec)
     return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
 
 
 def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
-    """Return the two objectives and the requirements in the form that pymoo takes."""
+    """Return the search for the front in pymoo's form: two objectives, and the requirements.
+
+    The objectives are low stiffness, and a high frequency of the first mode that interferes with control.
+    """
     from pymoo.core.problem import Problem
 
     low, high = _ends(task)
@@ -97,9 +101,9 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
 
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
-    """Return the geometry that meets the requirements with the largest reserve, or None.
+    """Return the leaf springs that meet the requirements with the largest reserve, or None.
 
-    Differential evolution finds it. It is given as logarithms of its sizes and the number of its sheet, shape (4,).
+    They are logarithms of their sizes and the index of their sheet, shape (4,). Differential evolution finds them.
     """
     settings = DesignSettings.current()
     bought = sheets(task.spec)
@@ -124,10 +128,10 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class GeometryScores:
-    """Scores of geometries: drive stiffness [N/m] and first interfering frequency [Hz].
+    """The stiffness [N/m] and a frequency [Hz] of many leaf springs, both of shape (count,).
 
-    Both have shape (count,). `excess` is the factor by which each requirement is broken, shape (count,
-    requirements).
+    The frequency is that of the first mode that interferes with control. `excess` is the factor by which each
+    requirement is broken, shape (count, requirements).
     """
 
     stiffness: np.ndarray
@@ -138,7 +142,10 @@ class GeometryScores:
 def evaluate_geometries(
     task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]
 ) -> GeometryScores:
-    """Evaluate geometries by closed forms."""
+    """Evaluate leaf springs by closed forms.
+
+    `sizes` [m], shape (count, 3), are lengths, widths and spacings, and `bought` their sheets.
+    """
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]
     return GeometryScores(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

@@ -50,7 +50,7 @@ class Geometry:
 
     @classmethod
     def of_stage(cls, flat: Mapping[str, Any]) -> Geometry:
-        """Read the geometry of a stage with [flexure], given as its flat keys [SI]."""
+        """Read the geometry of a stage with [flexure] from its keys in SI."""
         bought = (flat[f"flexure.{name}"] for name in ("leaves", "thickness", "material"))
         return cls.of(np.array([flat[f"flexure.{name}"] for name in SIZES]), Sheet(*bought))
 
@@ -86,7 +86,10 @@ def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) 
 
 
 def moved_along(flat: Mapping[str, Any], length: Any) -> dict[str, Any]:
-    """Move the given points of the stage with the leaf ends when the length [m] changes."""
+    """Return where points on the stage lie if the leaves' length [m] changes, as keys [SI].
+
+    Points that the file gives, such as the centre of mass, keep their distance from the leaf ends.
+    """
     points = [f"flexure.{name}_x" for name in ("centre", "actuation", "sensor")]
     return {key: flat[key] + length - flat["flexure.length"] for key in points if key in flat}
 

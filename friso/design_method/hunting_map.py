@@ -16,10 +16,11 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class HuntingMap:
-    """The fraction of corners that are not in position, over crossover and stroke.
+    """In which fraction of corners the stage is not in position, over crossover and stroke.
 
-    Crossovers [Hz] have shape (n,), strokes [m] (m,), and fractions (m, n). A corner counts if the stage is not in
-    position a quarter of a minute after a typical move. The fraction is NaN if a run failed.
+    Corners are the extremes of friction and masses. Crossovers [Hz] have shape (n,), strokes [m] (m,), and fractions
+    (m, n). A corner counts if the stage is not in position a quarter of a minute after a typical move. The fraction is
+    NaN if a run failed.
     """
 
     crossovers: np.ndarray

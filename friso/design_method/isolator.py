@@ -34,8 +34,8 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
 def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
     """Return the stage with a free joint: its own joint, or one from which a search starts.
 
-    The new joint has a stroke [m] and leaves with a Young's modulus `young` [Pa]. The controller stays tuned for the
-    whole mass. Raises StageError if the result is not a valid stage.
+    The new joint has a stroke [m], and stops whose stiffness follows from Young's modulus `young` [Pa]. The controller
+    stays tuned for the whole mass. Raises StageError if the result is not a valid stage.
     """
     settings = DesignSettings.current()
     free = stage.variants().get("free")

@@ -1,6 +1,6 @@
 """Find leaf springs for a joint of given stiffness and stroke.
 
-Of all leaf springs that fit, those with the highest interfering frequency are chosen.
+Of all leaf springs that fit, those are chosen whose first mode that interferes with control lies highest.
 """
 
 from __future__ import annotations
@@ -35,8 +35,9 @@ OF_LEAVES = (*SIZES, "leaves", "thickness", "material", "young", "poisson", "den
 def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     """Return the stage with leaf springs in place of its joint's numbers and its parasitic mode.
 
-    The leaf springs have the joint's stiffness and the highest possible interfering frequency. Sizes, sheets, loads and
-    factors of safety are the defaults of `friso init --spec`. Returns None if no leaves bear stroke and load.
+    The leaf springs have the joint's stiffness, and modes that interfere with control lie as high as possible. Sizes,
+    sheets, loads and factors of safety are the defaults of `friso init --spec`. Returns None if no leaves bear stroke
+    and load.
 
     If the stage `present` has [flexure], its points keep their distance from the leaf ends. Raises InputError for a
     joint that leaf springs cannot make.
@@ -65,7 +66,10 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
 
 
 def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
-    """Move the points of a stage so that they keep their distance from the ends of other leaves."""
+    """Return keys of points on the stage, moved so as to keep their distance from the leaf ends.
+
+    `geometry` are the new leaves. Values are texts with units.
+    """
     return {key: exactly(place, "m") for key, place in moved_along(flat, geometry.length).items()}
 
 
@@ -75,8 +79,8 @@ class _Search:
     def __init__(self, task: LeafTask, stiffness: float) -> None:
         """Prepare the search for leaves of a `stiffness` [N/m].
 
-        Two requirements are left to a later check on the whole stage: that the cart stays, and that no mode
-        interferes.
+        Two requirements are left to a later check on the whole stage: that the cart stays at rest, and that no mode
+        interferes with control.
         """
         self.task, self.stiffness = task, stiffness
         self.bought = sheets(task.spec)
@@ -85,7 +89,7 @@ class _Search:
         self.needs = [need for need in requirements(task) if need.name not in (BREAKAWAY, PARASITIC)]
 
     def best(self) -> np.ndarray:
-        """Return logarithms of the best length and spacing [m], and the number of the sheet, (3,)."""
+        """Return logarithms of the best length and spacing [m] and the index of the sheet, (3,)."""
         settings = DesignSettings.current()
         ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
         bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
@@ -102,10 +106,10 @@ class _Search:
         return np.asarray(minimum.x)
 
     def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Return the cost over lengths and spacings [m], (count, 2), to be minimised.
+        """Return the cost of leaf springs by length and spacing [m], rows of (count, 2).
 
-        It is the amount by which leaves break a requirement. For leaves that break none, it falls as their interfering
-        frequency rises.
+        `bought` has the sheet of each row. Leaves that break a requirement cost more, the farther they break it. For
+        other leaves, the cost falls as the frequency of the first mode that interferes with control rises.
         """
         settings = DesignSettings.current()
         sizes = self.with_width(spans, bought)
@@ -123,7 +127,7 @@ class _Search:
         return sizes
 
     def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:
-        """Return the logarithm of the factor by which leaves break a requirement.
+        """Return the logarithm of the largest factor by which leaves break a requirement, (count,).
 
         The space for their width is one requirement. The result is 0 or less for leaves that break none.
         """
@@ -134,9 +138,10 @@ class _Search:
         return np.where(np.isfinite(worst), worst, settings.worst_cost)
 
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
-        """Return the geometries in whole sizes next to `best`, (3,), with the required stiffness.
+        """Return leaf springs in whole sizes next to `best`, (3,), with the stiffness required.
 
-        They break no requirement, and the highest interfering frequency comes first.
+        They break no requirement. First comes the one with the highest frequency of a mode that interferes with
+        control.
         """
         settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]

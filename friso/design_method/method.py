@@ -44,7 +44,7 @@ Frictions = Callable[[Sequence[Stage]], OtherLaws]
 
 
 def own_law(stages: Sequence[Stage]) -> OtherLaws:
-    """Return no friction laws other than the stages' own."""
+    """Return no other friction laws, so that each stage is tried under its own law alone."""
     return OtherLaws()
 
 
@@ -52,7 +52,7 @@ def own_law(stages: Sequence[Stage]) -> OtherLaws:
 class Need:
     """Whether a machine needs an isolator, with the result that decides it.
 
-    `without` are the edges of hunting without an isolator over the corners of the specification.
+    `without` are the edges of hunting without an isolator, at each corner of the specification.
     """
 
     without: Corners
@@ -60,7 +60,10 @@ class Need:
 
     @property
     def isolator(self) -> bool:
-        """Tell whether the machine hunts without isolator at all crossovers up to its limit."""
+        """Tell whether the machine hunts, without isolator, too close to its highest crossover.
+
+        Its highest edge of hunting, times the factor of safety, then exceeds the machine's limit.
+        """
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
@@ -75,7 +78,7 @@ class NoDesign(Exception):
         self.reason, self.relaxed, self.need = reason, relaxed, need
 
     def of(self, need: Need) -> NoDesign:
-        """Return the error with the result on whether an isolator is needed."""
+        """Return this error, with the result on whether the machine needs an isolator."""
         return NoDesign(self.reason, self.relaxed, need)
 
 
@@ -84,7 +87,7 @@ class LeavesAndCrossover:
     """Leaf springs and a crossover that fit each other.
 
     It holds the task for which the leaves were chosen, the choice, and the stage with both. `comfortable` are the
-    ranges of crossovers [Hz] with a good modulus margin.
+    ranges of crossovers [Hz] with a modulus margin of at least 0.5.
     """
 
     task: LeafTask
@@ -97,14 +100,14 @@ class LeavesAndCrossover:
 class Design:
     """A design with the numbers of each step.
 
-    `without` and `edges` are the edges of hunting over the `corners` without and with isolator. `candidates` is the
-    Pareto front, and `confirmed` a part of it by the beam model. `fitted` holds the leaf springs and crossover chosen.
-    `controller` has the margins, `map` shows hunting over crossover and stroke, and `verification` the simulated moves.
-    `stage` is the design as a stage.
+    `without` and `edges` are the edges of hunting without and with isolator, at each corner of the specification.
+    `candidates` is the Pareto front of leaf springs, and `confirmed` a part of it by the beam model. `fitted` holds the
+    leaf springs and crossover chosen. `controller` has the margins, `map` shows hunting over crossover and stroke, and
+    `verification` the simulated moves. `stage` is the design as a stage.
 
     `damped` is the joint damping with which the crossover could be `faster` [Hz], if margins limit it. `by_law` holds
     the edges without and with isolator under each friction law; `without` and `edges` are the worst. `lost` names laws
-    that were not tried, with the numbers of the corners in which they do not keep what is measured.
+    that were not tried, with the indices of the corners whose friction they cannot match.
     """
 
     spec: Spec
@@ -156,16 +159,16 @@ class Design:
 
     @property
     def needed(self) -> bool:
-        """Tell whether the machine hunts without isolator at all crossovers up to its limit."""
+        """Tell whether the machine hunts, without isolator, too close to its highest crossover."""
         return self.need.isolator
 
 
 @dataclass(frozen=True)
 class UnfinishedDesign:
-    """Design without its later steps: leaf springs, stroke and crossover, not tried in moves.
+    """A design without its later steps: leaf springs, stroke and crossover, not tried in moves.
 
-    It was interrupted, or stopped because no isolator is needed, which `need` tells. `edges` of hunting with the
-    isolator are None if they were not found yet.
+    It was interrupted, or stopped because no isolator is needed; `need` has the result on this. `edges` of hunting with
+    the isolator are None if they were not found yet.
     """
 
     spec: Spec
@@ -195,7 +198,10 @@ class DesignInterrupted(KeyboardInterrupt):
 
 
 class NotNeeded(Exception):
-    """Raised where no isolator is needed and none was asked for; it holds the design `so_far`."""
+    """Raised by a design if the machine needs no isolator and none is wanted anyway.
+
+    It holds the design `so_far`.
+    """
 
     def __init__(self, so_far: UnfinishedDesign) -> None:
         super().__init__()
@@ -208,8 +214,8 @@ def design(
     """Design leaf springs, stroke and controller of an isolator.
 
     Edges of hunting are the worst over the stage's own friction and other `laws`. Raises InputError for unusable input,
-    NoDesign if nothing meets the specification, DesignInterrupted at Ctrl-C, and NotNeeded where no isolator is needed,
-    unless one is wanted `anyway`.
+    NoDesign if nothing meets the specification, and DesignInterrupted at Ctrl-C. Raises NotNeeded if no isolator is
+    needed, unless one is wanted `anyway`.
     """
     settings = DesignSettings.current()
     base = prepared(stage, spec)
@@ -279,7 +285,10 @@ def _by_law(
     population: Population,
     progress: Progress,
 ) -> dict[str, Corners]:
-    """Return the edges of a stage over the corners under each law, between crossovers [Hz]."""
+    """Return the edges of hunting of a stage at each corner, by friction law.
+
+    Crossovers from `low` to `high` [Hz] are searched.
+    """
     settings = DesignSettings.current()
     edges = {}
     for law, friction in laws.items():
@@ -291,10 +300,10 @@ def _by_law(
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
-    """Return the least joint damping with which margins no longer limit the crossover.
+    """Return the joint damping with which margins no longer limit the crossover.
 
-    The crossover [Hz] that leaves and machine then allow is returned with it. The damping is None if the crossover is
-    that high already, or if no tried damping helps.
+    The second result is the crossover [Hz] that is then possible. The damping is None if the crossover is that high
+    already, or if no damping tried helps.
     """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec
@@ -311,10 +320,10 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 
 
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
-    """Return the front for the largest stroke that allows the machine's limit on the crossover.
+    """Return the front of leaf springs for the largest stroke that allows the machine's limit.
 
-    If no stroke does, it is the front that allows the highest crossover. Raises NoDesign if no leaf springs meet the
-    requirements.
+    The limit is one on the crossover. If no stroke allows it, it is the front that allows the highest crossover. The
+    task that the front solves comes first. Raises NoDesign if no leaf springs meet the requirements.
     """
     settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
@@ -335,9 +344,9 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 
 
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
-    """Return the highest crossover [Hz] that a front allows.
+    """Return the highest crossover [Hz] that a front of leaf springs allows.
 
-    Its multiple is still below a first interfering frequency of the front.
+    It is the highest frequency on the front of a first mode that interferes with control, over a factor of safety.
     """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
@@ -345,7 +354,7 @@ def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
 def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Choose the softest leaves for the highest crossover that leaves and margins allow.
 
-    Raises NoDesign.
+    The two are adapted to each other in rounds. Raises NoDesign if none of the `candidates` fits.
     """
     settings = DesignSettings.current()
     target = min(task.spec.limit, allowed_crossover(task, candidates))
@@ -395,7 +404,10 @@ def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners, need: Need) -> None:
 
 
 def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
-    """Return relaxations with which the crossover keeps its distance from the edge [Hz]."""
+    """Yield changes of the specification that bring the crossover far enough above an edge.
+
+    The `edge` of hunting, the crossover `needed`, and the present `crossover` are in Hz.
+    """
     spec, name = fit.task.spec, "crossover above the edge of hunting"
     above = [max(low, needed) for low, high in fit.comfortable if high > needed]
     allowed_ = fit.choice.frequency / spec.safety.parasitic

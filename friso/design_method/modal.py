@@ -26,11 +26,12 @@ AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
 
 @dataclass(frozen=True)
 class Modal:
-    """Settled states of a stage (members,), with their plants over `omega` [rad/s].
+    """A stage in its settled states, with its plants over `omega` [rad/s].
 
-    `bare` are the plants without parasitic mode, and `with_modes` the plants with the modes of the leaf springs. Both
-    have shape (members, frequencies) [m/N] and include the drive. Modes are added to the motion of the stage as a rigid
-    mass, because they lie far above the frequencies at which the cart matters.
+    Settled states are the limit cases, and all states stuck under a bias force. `bare` are the plants without parasitic
+    mode, and `with_modes` the plants with the modes of the leaf springs. Both have shape (states, frequencies) [m/N]
+    and include the drive. Modes are added to the motion of the stage as a rigid mass, because they lie far above the
+    frequencies at which the cart matters.
     """
 
     flat: Mapping[str, Any]
@@ -41,7 +42,7 @@ class Modal:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
-        """Build the states of a stage, given as flat keys, with the modes of its leaf springs."""
+        """Build the settled states of a stage, from its keys in SI, with its leaf springs' modes."""
         rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
         members, drive = settled_members(rigid), DriveTiming.of(rigid)
         omega = _frequencies(rigid, leaves, drive)
@@ -60,7 +61,10 @@ class Modal:
         return np.array([self._margin(factors[k]) if stable[k] else 0.0 for k in range(len(factors))])
 
     def _margin(self, factor: np.ndarray) -> float:
-        """Return the least margin at a factor of the bandwidth, for states stable without the modes."""
+        """Return the least modulus margin of all states, with the bandwidth scaled by `factor`.
+
+        The states must be stable without the modes; it is 0 if the modes make one of them unstable.
+        """
         shape = controller_response(faster(self.flat, factor), self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
         stable = np.abs(_turns((1 + loop) / (1 + bare))) < 0.5
@@ -68,7 +72,7 @@ class Modal:
 
     @property
     def comfortable(self) -> tuple[Range, ...]:
-        """Return the crossovers [Hz] with a modulus margin of 0.5."""
+        """Return the crossovers [Hz] with a modulus margin of at least 0.5."""
         settings = FrequencySettings.current()
         return ranges_below(
             np.geomspace(*searched_crossovers(self.flat), settings.crossover_steps), lambda at: WANTED - self.margin(at)
@@ -76,7 +80,7 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Count how often curves, (..., frequencies), run around the origin over all frequencies."""
+    """Count how often curves `ratio`, (..., frequencies), run around the origin."""
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 

@@ -93,7 +93,7 @@ def _aligned(lines: Sequence[str]) -> str:
 
 
 def _line(stage: Stage, key: str, share: float) -> str:
-    """Return the line of a key with its range: the stage's own, or a fraction around its value.
+    """Return the line of a key with its range: the stage's own, or `share` to both sides.
 
     Coulomb friction does not exceed the static friction.
     """

@@ -18,13 +18,16 @@ from friso.intervals import Interval
 
 @dataclass(frozen=True)
 class Population:
-    """Machines as flat keys with SI arrays (count,), for the keys that differ from the stage."""
+    """Machines as arrays of shape (count,) by key [SI], for keys that differ from the stage."""
 
     keys: Mapping[str, np.ndarray]
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys with each machine's values; the controller stays unchanged."""
+        """Return the stage's keys, with each machine's values where machines differ from it.
+
+        The controller stays unchanged.
+        """
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:
@@ -96,9 +99,9 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
-    """Return moves there and back at fractions, from 0 to 1, of travel and acceleration.
+    """Return keys of moves there and back, at fractions from 0 to 1 of the ranges specified.
 
-    The fractions are those of the ranges.
+    `travel` and `acceleration` are these fractions, on a logarithmic scale.
     """
     settings = DesignSettings.current()
     distance, rate = (
@@ -138,7 +141,7 @@ def _masses(spec: Spec) -> dict[str, Interval]:
 def _population(
     ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
 ) -> Population:
-    """Return machines at fractions, from 0 to 1, of the ranges.
+    """Return machines whose keys lie at fractions `shares`, from 0 to 1, of their ranges.
 
     Sliding friction is limited to the static friction. Machines with both equal are included, although they cannot
     hunt.

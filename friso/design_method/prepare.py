@@ -20,7 +20,7 @@ LIMITS = ("force_limit", "anti_windup", "anti_windup_time")
 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
-    """Return the stage with a free joint of the largest leaf springs allowed.
+    """Return the stage with a free joint of leaf springs as large and as thin as allowed.
 
     The leaf springs are a start, to be replaced. Masses, for which the controller is tuned, lie in the middle of their
     ranges. Points of the stage keep their distance from the leaf ends, and the load comes from the specification.

@@ -22,7 +22,7 @@ from friso.leaf_springs.mechanism import Mechanism
 class Relaxation:
     """A `key` of the specification that must change from `value` to `needed` [unit].
 
-    Changed alone, it lets the requirement be met, by leaf springs of a `geometry`. The geometry is None for
+    Changed alone, it lets the `requirement` be met, by leaf springs of a `geometry`. The geometry is None for
     requirements on other parts.
     """
 
@@ -35,9 +35,9 @@ class Relaxation:
 
 
 def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
-    """Return for each requirement by how much it must be relaxed if all others stand.
+    """Return by how much each requirement must be relaxed if all others stand, the least first.
 
-    The least change comes first. The result is empty if no single relaxation is enough.
+    The result is empty if no single relaxation is enough.
     """
     needs = [*requirements(task), *_space(task)]
     all_relaxations = [relaxation for k in range(len(needs)) for relaxation in _alone(task, needs, k)]
@@ -64,7 +64,10 @@ def _space(task: LeafTask) -> list[Requirement]:
 
 
 def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
-    """Build the function that tells by which factor a mechanism exceeds a limit of size."""
+    """Return a function that computes by which factor leaf springs break a limit of a size.
+
+    `name` is the size, and `low` is true for a lower limit.
+    """
 
     def excess(mechanism: Mechanism) -> Any:
         return limit / getattr(mechanism, name) if low else getattr(mechanism, name) / limit
@@ -74,10 +77,10 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
 
 @dataclass(frozen=True)
 class _Trials:
-    """Geometries in more space than allowed, given by variables.
+    """Leaf springs in more space than allowed, given by variables of a search.
 
-    The variables are logarithms of length, width, spacing and thickness, and the number of the kind. The thickness is
-    `free`, or is rounded to the next available sheet.
+    The variables are logarithms of length, width, spacing and thickness, and the index of the kind: number of leaves
+    and material. The thickness is `free`, or is rounded to the next available sheet.
     """
 
     task: LeafTask
@@ -114,7 +117,7 @@ class _Trials:
 
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
-    """Return the least relaxation of requirement `k` with which all others can be met."""
+    """Yield the least changes of keys that relax requirement `k` so that all others can be met."""
     settings = DesignSettings.current()
     of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))

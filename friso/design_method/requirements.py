@@ -23,7 +23,7 @@ class LeafTask:
     """The task that leaf springs are designed for.
 
     It holds the specification, a stroke [m], the crossover [Hz], the least static friction [N], and the stage's flat
-    keys without leaves. A multiple of the crossover must lie below the first interfering frequency.
+    keys without leaves. The first mode that interferes with control must lie above a multiple of the crossover.
     """
 
     spec: Spec
@@ -48,8 +48,8 @@ class LeafTask:
 class RelaxableKey:
     """A key of the specification that relaxes a requirement.
 
-    It holds the `key`, its `value` and `unit`, and a function from the factor by which a geometry breaks the
-    requirement to the value needed. That value is None if no change of the key is enough.
+    It holds the `key`, its `value` and `unit`. `needed` computes the value needed from the factor by which leaf springs
+    break the requirement; None if no change of the key is enough.
     """
 
     key: str
@@ -62,7 +62,7 @@ class RelaxableKey:
 class Requirement:
     """A requirement in words, with the keys that relax it.
 
-    Its `excess` is the factor by which geometries break it: 1 if they just meet it.
+    `excess` computes the factor by which leaf springs break it: 1 if they just meet it.
     """
 
     name: str
@@ -71,12 +71,12 @@ class Requirement:
 
 
 def more(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that relaxes a requirement when it becomes larger."""
+    """Return a key that must become larger to relax a requirement, by the factor it is broken."""
     return RelaxableKey(key, value, unit, lambda excess: value * excess)
 
 
 def less(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that relaxes a requirement when it becomes smaller."""
+    """Return a key that must become smaller to relax a requirement, by the factor it is broken."""
     return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 
@@ -137,7 +137,7 @@ def requirements(task: LeafTask) -> list[Requirement]:
 
 
 def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
-    """Return a smaller load along the leaves, if that alone is enough.
+    """Return the load along the leaves as a key that relaxes, if a smaller load alone is enough.
 
     The weight of the stage stays.
     """
@@ -173,8 +173,8 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
 def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
     """Return the load on the leaves relative to the load at which they buckle.
 
-    It adds two parts: the largest force along a leaf, times the number of leaves, over the `buckling` load [N]; and the
-    force across the leaves over the force at which they buckle sideways.
+    It adds two parts. One is the largest force along a leaf, times the number of leaves, over the `buckling` load [N].
+    The other is the force across the leaves over the force at which they buckle sideways.
     """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across

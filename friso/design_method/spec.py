@@ -35,9 +35,9 @@ from friso.stage.section import Section, Table
 
 @dataclass(frozen=True)
 class OneOrMany:
-    """A key that takes one item or a list of items.
+    """A key of the specification that takes one item or a list of items.
 
-    `read_one` reads each item, and raises SpecError.
+    `of` reads each item; None stands for names of materials. Raises SpecError for an item that is not usable.
     """
 
     of: Quantity | Number | None
@@ -221,7 +221,10 @@ class SpecLeaves(Section):
     places in the stage file take precedence."""
 
     def space(self, name: str) -> tuple[float, float]:
-        """Return the least and the largest length, width or spacing [m]; a fixed one is both."""
+        """Return the least and the largest length, width or spacing [m].
+
+        A single value is the largest; the least is then a tenth of it.
+        """
         allowed: Interval = getattr(self, name)
         return (allowed.high / 10 if allowed.single else allowed.low), allowed.high
 

@@ -39,9 +39,10 @@ class MachineOutcomes:
     """Outcomes of machines after their moves, as arrays of shape (count,).
 
     `words` say what the run does until its end (`friso.hunting.criteria.run_outcome`), with the position window as
-    band. A machine rests if it stays in the window for the last quarter of the run. For all other machines, the words
-    are those of a run ten times as long. `settling` [s] is the time after the reference's last corner from which the
-    stage stays in the window; NaN if it does not rest. `swing` [m] is the peak-to-peak motion in the last quarter.
+    band. A machine rests if it stays in the window for the last quarter of the run. All other machines are simulated
+    ten times as long, and their words are those of the longer run. `settling` [s] is the time after the reference's
+    last corner from which the stage stays in the window; NaN if it does not rest. `swing` [m] is the peak-to-peak
+    motion in the last quarter.
     """
 
     words: np.ndarray
@@ -94,7 +95,7 @@ class MachineOutcomes:
 
     @property
     def worst(self) -> int:
-        """Return the number of the worst move.
+        """Return the index of the worst move.
 
         It is the restless move with the largest swing, or else the move that settles last.
         """
@@ -140,10 +141,9 @@ def move_machines(
     label: str = "moves",
     patient: bool = True,
 ) -> MachineOutcomes:
-    """Simulate the moves of stages given as flat keys, arrays of shape (count,).
+    """Simulate the moves of `count` stages, given by keys with arrays of shape (count,).
 
-    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window
-    [m].
+    If `patient`, machines that are not in position are simulated again for longer. `window` is the position window [m].
     """
     settings = DesignSettings.current()
     first = _followed_moves(flat, count, window, settings.followed_time, progress, label)
@@ -194,9 +194,10 @@ def _followed_moves(
 
 
 def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
-    """Return one of the machines with its move as a stage, for a time [s] after the move.
+    """Return a machine as a stage, with its move and a time [s] after it.
 
-    Its joint has plain numbers, since the deviation of its stiffness belongs to no single size of the leaves.
+    `keys` are those of the machine. The joint has plain numbers instead of leaf springs, since no single size of the
+    leaves explains its stiffness.
     """
     flat = stage.flat()
     follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")

@@ -21,8 +21,8 @@ _LEAF = (bool, int, float, str, type(None))
 def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
     """Convert a JSON document to a Dataset.
 
-    The first table of tables, such as "cases" or "models", gives a dimension of its name, and each of its numbers a
-    variable along it. The document's own numbers become variables, and its texts attributes.
+    The first entry that holds tables by name, such as "cases", becomes a dimension of its name. Each number in these
+    tables becomes a variable along it. The document's own numbers become variables, and its texts attributes.
     """
     import xarray as xr
 
@@ -59,7 +59,7 @@ def _label(record: Mapping[str, Any], number: int) -> str:
 
 
 def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
-    """Yield the numbers and texts of a table and of the tables within it, with their keys."""
+    """Yield keys with numbers and texts of a table; a key in a table within has both names."""
     for key, value in record.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{before}{key}_")

@@ -304,7 +304,7 @@ def _of_others(folder: Path, maker: str, expected: str) -> InputError:
 
 
 def _beside(folder: Path) -> str:
-    """Return a suggested `--out` option: the folder's name with "-2", as FOLDER is taken."""
+    """Return a suggested `--out` option: the name of a folder that is taken, with "-2"."""
     return f"--out {shell_word(f'{folder}-2' if folder.name.strip('.') else 'report')}"
 
 

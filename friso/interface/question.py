@@ -50,7 +50,8 @@ class Choices:
 class Question:
     """One question: where its function is, and how its command takes options and shows answers.
 
-    Raises ValueError for a topic that is not one of TOPICS, TypeError for a place that is not a number.
+    Raises ValueError for a topic that is not one of TOPICS, and TypeError for a `place` in the list of commands that is
+    no number.
     """
 
     package: str
@@ -103,7 +104,7 @@ class Question:
     """Module whose function `run` replaces the usual command, which only shows the answer."""
 
     def __post_init__(self) -> None:
-        """Check topic and place. Raises ValueError or TypeError."""
+        """Check the topic, and the place in the list of commands. Raises ValueError or TypeError."""
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
         if not isinstance(self.place, int | float):

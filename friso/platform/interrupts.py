@@ -46,7 +46,7 @@ def came() -> int:
 
 
 def last_word(number: int) -> str:
-    """Return the last line of a command, which says what ended it."""
+    """Return the last line that a command prints, which says what ended it."""
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"

@@ -72,7 +72,7 @@ if sys.platform == "win32":
             console.SetConsoleCtrlHandler(None, False)
 
     def signal_later(seconds: float, handler: Callable[[int, FrameType | None], object]) -> None:
-        """Have a handler of SIGINT called in the main thread after some time."""
+        """Call a handler of SIGINT in the main thread after some time [s]."""
         timer = threading.Timer(seconds, _thread.interrupt_main, (signal.SIGINT,))
         timer.daemon = True
         timer.start()
@@ -81,8 +81,7 @@ if sys.platform == "win32":
         """Do nothing: on this system the timer ends with the process."""
 
     def signals_told() -> int:
-        """Return a descriptor from which the numbers of signals can be read as they come,
-        a byte each."""
+        """Return a descriptor from which the numbers of signals can be read, a byte each."""
         outlet, inlet = os.pipe()
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
         return outlet
@@ -169,23 +168,19 @@ if sys.platform == "win32":
         return f"{cause}; a path of {length} characters, which Windows takes only if long paths are enabled"
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Return who, besides this user and root, may write to a file or folder; "" for nobody.
-
-        The answer is in words. For a folder this means replacing its files. In a folder with the sticky bit (/tmp),
-        everybody may only replace their own files.
-        """
+        """Return "", because on Windows it is not checked who else may write to a file."""
         return ""
 
     def is_users_own(status: os.stat_result) -> bool:
-        """Tell whether a file belongs to this user."""
+        """Return True, because on Windows it is not checked to whom a file belongs."""
         return True
 
     def is_open_to_others(status: os.stat_result) -> bool:
-        """Tell whether other users may read a file, or write to it."""
+        """Return False, because on Windows it is not checked who may use a file."""
         return False
 
     def closed_to_others(folder: Path) -> os.stat_result:
-        """Return the unchanged status of a folder; see `foreign_writers`."""
+        """Return the status of a folder, which is left as it is on Windows."""
         return folder.lstat()
 
 else:
@@ -200,7 +195,7 @@ else:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def signal_later(seconds: float, handler: Callable[[int, FrameType | None], object]) -> None:
-        """Have a handler of SIGALRM called in the main thread after some time [s]."""
+        """Call a handler of SIGALRM in the main thread after some time [s]."""
         signal.signal(signal.SIGALRM, handler)
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
@@ -212,7 +207,7 @@ else:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
     def signals_told() -> int:
-        """Return a descriptor from which the numbers of signals can be read as they come, a byte each."""
+        """Return a descriptor from which the numbers of signals can be read, a byte each."""
         outlet, inlet = os.pipe()
         os.set_blocking(inlet, False)
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
@@ -265,7 +260,7 @@ else:
         return error.strerror or str(error)
 
     def foreign_writers(status: os.stat_result) -> str:
-        """Return who, besides this user and root, may write to a file or folder; "" for nobody.
+        """Return why others than this user and root may write to a file; "" if they may not.
 
         The answer is in words. For a folder this means replacing its files. In a folder with the sticky bit (/tmp),
         everybody may only replace their own files.

@@ -33,7 +33,7 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 class Remedy:
     """A remedy: its `name`, the stage from which it starts, and the variables it changes.
 
-    `buys_joint` tells that it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
+    `buys_joint` is true if it needs a joint; otherwise only the controller changes. `makes` names the remedy whose
     joint this remedy builds from leaf springs.
     """
 
@@ -44,9 +44,10 @@ class Remedy:
     makes: str = ""
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
-        """Return the keys that change at points (points, variables), with coordinates from 0 to 1.
+        """Return the changed keys at points of the search, shape (points, variables).
 
-        Coordinates span the range of each variable. Each key has an array of shape (points,).
+        `shares` are the points, by coordinates from 0 to 1 over the range of each variable. Each key has an array of
+        shape (points,).
         """
         flat, changed = self.stage.flat(), dict[str, Any]()
         for variable, share in zip(self.variables, shares.T, strict=True):
@@ -55,9 +56,10 @@ class Remedy:
         return changed
 
     def values(self, shares: np.ndarray) -> np.ndarray:
-        """Return the numbers of the variables at points, both of shape (points, variables).
+        """Return the SI values of the variables at points of the search, shape (points, variables).
 
-        A key has its value after all variables that change it, such as the bandwidth.
+        `shares` are the points, by coordinates from 0 to 1. A key has its value after all variables that change it,
+        such as the bandwidth.
         """
         changed = self.changes(shares)
         columns = [changed.get(v.name, v.at(share)) for v, share in zip(self.variables, shares.T, strict=True)]
@@ -79,7 +81,7 @@ class Remedy:
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """Return the stage at one point, (variables,), with coordinates from 0 to 1.
+        """Return the stage at one point of the search, shape (variables,), in coordinates 0 to 1.
 
         Numbers are rounded to four digits; unchanged numbers are kept exactly.
         """
@@ -107,13 +109,16 @@ def with_bandwidth(remedy: Remedy) -> Remedy:
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
-    """Return the remedy that varies all gains, if the bandwidth is not the only gain."""
+    """Return the remedy that varies all gains, after the variables `first`.
+
+    The list is empty if the bandwidth would be the only variable.
+    """
     several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
 def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Yield a notch at the parasitic mode, if margins need it to reach the goal's bandwidth."""
+    """Yield a notch at the parasitic mode, unless the goal's bandwidth is reached without one."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return
@@ -135,7 +140,10 @@ def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _reaches(stage: Stage, goal: Goal) -> bool:
-    """Tell whether a faster controller reaches the bandwidth limit with the required margin."""
+    """Tell whether a faster controller reaches the bandwidth limit with the margin required.
+
+    The answer is False if the goal has no such limit.
+    """
     if goal.bandwidth_limit is None or goal.margin > WANTED:
         return False
     flat = stage.flat()

@@ -20,10 +20,10 @@ from friso.stage import Stage
 class Confirmation:
     """Result of searching for hunting at a stage's own bandwidth and at nearby ones.
 
-    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does, and `word` is
-    the verdict on its own motion from fewer starts; None if that takes too much work. `quiet` tells at which of the
-    `factors` of its bandwidth, from below to above, it certainly does not hunt. `unstable` are the states in which its
-    loop is unstable.
+    `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does. `word` is the
+    verdict on the stage's own motion from fewer starts; None if that takes too much work. `factors` are other
+    bandwidths as multiples of its own, and `quiet` is true where it certainly does not hunt. `unstable` are the states
+    in which its loop is unstable.
     """
 
     stage: Stage
@@ -35,7 +35,7 @@ class Confirmation:
 
     @property
     def certain(self) -> bool:
-        """Tell whether it is certain if the stage hunts at its own bandwidth."""
+        """Tell whether the verdict on hunting at the stage's own bandwidth is certain."""
         return self.hunting.certain
 
     @property
@@ -46,9 +46,10 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return the unconfirmed parts, by names of `DOUBTS`.
+        """Return why the stage may still hunt, as names of `DOUBTS`.
 
-        The names are in `friso.questions.tune.present_words`.
+        They are in `friso.questions.tune.present_words`. The reasons are the verdict, its certainty, and hunting at
+        lower or higher bandwidths, or that the work was given up.
         """
         if self.word is None:
             return ("given up",)

@@ -19,13 +19,14 @@ SHARE = 0.95
 class Goal:
     """The goal that a tuned machine must meet, and the parts that may change.
 
-    A machine is in position `within` [m] of its reference. 95 % of machines and moves must be there `settle` [s] after
-    the reference stands still; None means before the run ends. The actuator may use at most `force_limit` [N]; None
-    means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only the stage file limits
-    it.
+    A machine is in position `within` [m] of its reference. A fraction `share` (95 %) of machines and moves must be
+    there `settle` [s] after the reference stands still; None means before the run ends. The actuator may use at most
+    `force_limit` [N]; None means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only
+    the stage file limits it.
 
-    `moves` None stands for the moves of the stage. All settled states must keep the modulus `margin` and the `distance`
-    from hunting. `controller` and `joint` tell which parts may change.
+    `moves` None stands for the moves of the stage. The limit cases, and all states stuck under a bias force, must keep
+    the modulus `margin`. Hunting must be a factor `distance` in bandwidth away. `controller` and `joint` are true if
+    these parts may change.
     """
 
     within: float = 1e-6

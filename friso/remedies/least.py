@@ -45,7 +45,7 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
-    """Return a key that varies between two values, and slightly beyond if a stage allows it."""
+    """Return a key as a variable between two values, and slightly beyond if a stage allows it."""
     settings = RemedySettings.current()
     towards, away = (
         (new * settings.factor_beyond, old / settings.factor_away)
@@ -66,10 +66,11 @@ def _possible(tuned: Stage, key: str, value: float, otherwise: float) -> float:
 
 
 def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
-    """Yield the smallest changes for a remedy of `least_remedy`, each of shape (variables,).
+    """Yield the smallest changes of the controller that may work, each of shape (variables,).
 
-    Fewer keys come first, then smaller factors. Single keys are tried first, because any change of one key counts as
-    smaller than a change of several. Only changes smaller than `most` are returned (see `change_costs`).
+    The remedy searched varies each changed key separately (see `least_remedy`). Fewer keys come first, then smaller
+    factors. Single keys are tried first, because any change of one key counts as smaller than a change of several. Only
+    changes whose `size_cost` is less than `most` are returned.
     """
     yield from of_one_key(search, most)
     if most >= min(2, len(search.remedy.variables)):
@@ -81,8 +82,9 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield changes of a single variable that work, the smallest first, all smaller than `most`.
 
-    They break no constraint, a fraction `enough` of the fresh machines meets the goal, and no machine hunts. With
-    `enough`, values between grid points are not tried, so the first answer has a reserve.
+    They break no constraint, the fraction `enough` of the fresh machines meets the goal, and enough surveyed machines
+    do not hunt (`Search.clear`). With `enough`, values between grid points are not tried, so the first answer has a
+    reserve.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -106,10 +108,11 @@ def of_one_key(search: Search, most: float = np.inf, enough: float | None = None
 
 
 def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> Iterator[np.ndarray]:
-    """Yield the points (points, variables) that work on fresh machines, of which none hunts.
+    """Yield the points (points, variables) that work on fresh machines, without hunting.
 
-    A fraction `enough` of the machines must meet the goal by moves and margins; by default, the least fraction that
-    certainly meets the goal.
+    Enough surveyed machines must not hunt (`Search.clear`). At least the fraction `enough` of the fresh machines must
+    meet the goal by moves and margins. By default, it lies one standard error above the fraction required of all
+    machines.
     """
     settings = RemedySettings.current()
     least = search.goal.surely(search.fresh.count) if enough is None else enough
@@ -119,9 +122,9 @@ def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> 
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
-    """Return the sizes of changes at points, shape (points,).
+    """Return the sizes of the changes at points with coordinates `shares`, shape (points,).
 
-    The integer part counts the keys that change; the fraction grows with the factor.
+    The integer part counts the keys that change; the fraction grows with the factors of change.
     """
     logarithms = np.stack(
         [
@@ -133,18 +136,18 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
-    """Return the size of a change as a number.
+    """Return the size of a change as a number, to compare changes.
 
-    Its integer part is the number of keys; its fraction grows with the logarithm of the whole factor.
+    Its integer part is the number of keys; its fraction grows with the `logarithm` of the product of all factors.
     """
     return np.asarray(keys + logarithm / (1 + logarithm))
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """Return points from which a search starts, shape (points, variables).
+    """Return settings from which a search starts, as coordinates of shape (points, variables).
 
-    The working settings come first. Then follow settings with some keys restored to the present value, wholly or
-    half-way in the logarithm, the fewest changed keys first.
+    First come those that are already known to work. Then follow settings in which only some keys change, the fewest
+    first. Changes are taken wholly, and half-way in the logarithm.
     """
     home, works = _ends(remedy).T
     _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
@@ -153,13 +156,13 @@ def _beginnings(remedy: Remedy) -> np.ndarray:
 
 
 def _ends(remedy: Remedy) -> np.ndarray:
-    """Return the coordinates of present and working numbers, from 0 to 1, (variables, 2)."""
+    """Return each variable's present value, and one that works, as coordinates, (variables, 2)."""
     flat = remedy.stage.flat()
     return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """Yield points to verify, each of shape (variables,), the smallest change first.
+    """Yield settings to verify, as points of shape (variables,), the smallest change first.
 
     They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
     the working settings, then other points tried. Points that work on fresh machines come before all others.

@@ -36,9 +36,10 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 @dataclass(frozen=True)
 class MoveRange:
-    """Moves of machines, from `smallest` to `largest` [m], uniform in the logarithm.
+    """The moves that machines make: sizes from `smallest` to `largest` [m].
 
-    `accelerations` [m/s^2] are drawn likewise; None stands for the acceleration in the stage file.
+    Sizes are uniform in the logarithm, and so are the `accelerations` [m/s^2], given as a range; None stands for the
+    acceleration in the stage file.
     """
 
     smallest: float
@@ -101,7 +102,7 @@ class Fleet:
         return len(self.sizes)
 
     def take(self, numbers: np.ndarray) -> Fleet:
-        """Return the machines with these numbers."""
+        """Return a fleet of the machines with these indices."""
         ratios, shifts = (
             {key: value[numbers] for key, value in column.items()} for column in (self.ratios, self.shifts)
         )
@@ -116,9 +117,10 @@ class Fleet:
         return replace(self, sizes=sizes, moves=replace(self.moves, smallest=smallest))
 
     def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
-        """Return flat keys of all machines at all `points`, whose arrays have shape (points,).
+        """Return flat keys, such as friction.static with SI values, of all machines at all `points`.
 
-        All machines at the first point come first. The controller is tuned for the stage, not for the drawn machines.
+        `changes` are the keys of the points, of shape (points,). All machines at the first point come first. The
+        controller is tuned for the stage, not for the drawn machines.
         """
         flat = stage.flat()
         tuned = as_tuned(flat)
@@ -131,13 +133,13 @@ class Fleet:
         return {**flat, **self._motion(flat, points)}
 
     def _motion(self, flat: Mapping[str, Any], points: int) -> dict[str, Any]:
-        """Return the keys of the motion with which the machines make their moves at all points."""
+        """Return the keys of the motion with which machines make their own moves, at all points."""
         faster = {} if self.accelerations is None else {ACCELERATION: np.tile(self.accelerations, points)}
         moved = {**flat, **{key: value for key, value in faster.items() if key in flat}}
         return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the ratios of the keys that the stage has.
+        """Return the factors on keys of each machine, for the keys that the stage has.
 
         Both parts of a split mass vary with the whole mass.
         """

@@ -57,11 +57,11 @@ room for a second one from leaf springs; an extra package is missing; or no usua
 class Advice:
     """Results of all remedies for a stage, in the order of the catalogue.
 
-    `case` is the check of the stage, `present` its performance on machines, and `unmet` the parts of the goal that it
-    misses or may miss (names of `friso.questions.tune.present_words.DOUBTS`). `limits` gives the bandwidths with enough
-    margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal to relax
-    if nothing works, and `relaxed_all` whether all of these were tried. `interrupted` tells whether the search was
-    ended early, and `least_sought` whether the smallest change was searched before that.
+    `case` is the check of the stage, and `present` its performance on machines. `unmet` are the parts of the goal that
+    it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits` gives the bandwidths with
+    enough margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal
+    to relax if nothing works; `relaxed_all` is true if all of these were tried. `interrupted` is true if the search was
+    ended early, and `least_sought` if the smallest change was searched before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -120,7 +120,7 @@ class Advice:
     def working(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that work: those for all moves first, and of these the smallest change first.
 
-        Leaf springs follow the remedy whose joint they make.
+        Leaf springs that make the joint of a remedy are no remedies of their own.
         """
         works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
         return tuple(sorted(works, key=lambda outcome: (not self.for_all_moves(outcome), self.size(outcome))))
@@ -138,17 +138,20 @@ class Advice:
         return _recommended(self.working, self.goal)
 
     def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
-        """Return the outcome of a remedy's joint when made of leaf springs."""
+        """Return the outcome of a remedy's joint when made of leaf springs, or None."""
         return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
 
     @property
     def fastest(self) -> RemedyOutcome | None:
-        """Return the working remedy with the shortest settling time."""
+        """Return the working remedy with the shortest settling time, or None."""
         return min(self.working, key=lambda outcome: slowest(outcome, self.goal), default=None)
 
 
 def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
-    """Return the time [s] in which 95 % settle with a remedy; infinite if not measured."""
+    """Return the time [s] in which enough machines and moves settle with a remedy.
+
+    Enough is the fraction `goal.share`. The time is infinite if they never do, or if the remedy was not measured.
+    """
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
@@ -179,8 +182,9 @@ def tune(
 ) -> Advice:
     """Optimise and verify every remedy that the goal allows, or the remedies named in `chosen`.
 
-    `begins` is called before the work starts, and `answered` with the outcome of the first remedy. Raises InputError
-    for a motion after which nothing has to settle.
+    Machines are drawn with the `seed` and the `correlations` of uncertain keys. `budget` sets the size of the searches.
+    `begins` is called before the work starts. `answered` is called with the outcome of a changed bandwidth alone, if
+    that is tried first. Raises InputError for a motion after which nothing has to settle.
     """
     settings = RemedySettings.current()
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
@@ -261,7 +265,7 @@ def tune(
 
 
 def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int, moves: MoveRange | None = None) -> Fleet:
-    """Draw machines around a stage, without the stage file's own machine."""
+    """Draw machines around a stage, of which none is the stage file's own."""
     return draw_fleet(stage, correlations, count + 1, seed, moves).take(np.arange(1, count + 1))
 
 
@@ -288,11 +292,12 @@ def machines_of_search(
 
 @dataclass
 class _Session:
-    """A session that tries all remedies of a stage in turn, with the `outcomes` so far.
+    """Search for remedies of one stage: what was tried, how it ended, and what is next.
 
-    `searching` is the current search, and `searches` has all searches by remedy. `least_factor` tells that the smallest
-    bandwidth that works is searched, and `is_least` that it was found. All remedies together may take the work
-    `allowed`.
+    `outcomes` are the results so far, `searching` is the current search, and `searches` has all searches by remedy.
+    While `least_factor` is true, the smallest bandwidth that works is searched; `is_least` is true if it was found.
+    `allowed` limits the work of all remedies together. Settings are searched on `machines`, and verified on `unseen`
+    ones, then on `further` ones if the result is unclear.
     """
 
     stage: Stage
@@ -319,9 +324,10 @@ class _Session:
         return any(outcome.certainty == "works" for outcome in self.outcomes)
 
     def tries_one_factor(self, remedy: Remedy, others: bool) -> None:
-        """Find the smallest factor on the bandwidth that works, as a first answer.
+        """Search the smallest factor on the bandwidth that works, as a first answer.
 
-        If there is none, or there are no `others` to improve on it, the factor that settles soonest is searched.
+        If there is none, or no `others` follow that may be smaller changes, the factor that settles soonest is
+        searched.
         """
         search = self._begun(remedy, self.budget.machines)
 
@@ -362,7 +368,10 @@ class _Session:
                 self.tries(remedy)
 
     def _combines(self, remedy: Remedy) -> bool:
-        """Tell whether a remedy combines the variables of several others, each of which works alone."""
+        """Tell whether a remedy only combines other remedies that work alone.
+
+        Its variables are then those of at least two of them together.
+        """
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
         alone = [varied for one in working if (varied := {variable.name for variable in one.variables}) < names]
@@ -434,7 +443,7 @@ class _Session:
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
         """Search for the smallest change of the keys that a working remedy changes.
 
-        Returns whether the remedy changes any key that can be searched.
+        Returns False if none of these keys can be searched.
         """
         settings = RemedySettings.current()
         assert outcome.stage is not None
@@ -453,7 +462,7 @@ class _Session:
         return True
 
     def tries_large_moves(self) -> None:
-        """Verify the settings that serve large moves only, the one for the smallest moves first.
+        """Verify settings that serve large moves only, first those that begin at the smallest move.
 
         If an allowance of work is used up, the others are left out.
         """
@@ -478,7 +487,7 @@ class _Session:
                 self.outcomes[place] = outcome
 
     def interrupted(self) -> None:
-        """Record the best point so far of the current remedy, without verification."""
+        """Record the best settings so far of the current remedy, which are not verified."""
         if self.searching is not None and self.outcomes[-1].interrupted:
             self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
 
@@ -487,7 +496,7 @@ class _Session:
         return change_size(self.stage, outcome.stage)
 
     def _begun(self, remedy: Remedy, machines: int) -> Search:
-        """Start the search for a remedy on some of the machines."""
+        """Start the search for a remedy on the first `machines` of those drawn for searches."""
         self.report.begins(_steps(remedy, self.budget))
         several = self.machines.take(np.arange(machines))
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
@@ -497,9 +506,9 @@ class _Session:
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
-        """Record the outcome of the first verified one of a few points, or else of the first.
+        """Verify settings that a search offers, in turn until some work, and record the outcome.
 
-        A point that is not verified is not sure to work.
+        If none do, the first outcome is recorded, which is not sure to work. Few are tried, and the work is limited.
         """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
@@ -528,7 +537,7 @@ class _Session:
     def makes_leaves(self) -> None:
         """Size and verify leaf springs for the joints of remedies that are described in full.
 
-        Their search is over, so its work does not limit this.
+        The work allowed for searches does not limit this.
         """
         working = (one for one in self.outcomes if one.certainty == "works" and not one.remedy.makes)
         for one in _recommended(sorted(working, key=self._size), self.goal):
@@ -536,11 +545,11 @@ class _Session:
                 self._made_of_leaves(one)
 
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
-        """Measure a point on fresh machines, and verify it by limit cycles if enough meet the goal.
+        """Measure settings on fresh machines; verify them by limit cycles if enough meet the goal.
 
-        The machines make all moves, or those from `moves_from` [m] on. The interval of the fraction of machines that
-        meet the goal must lie at the required fraction or above. While the interval leaves that open, further machines
-        are measured.
+        `shares` are their coordinates. The machines make all moves, or those from `moves_from` [m] on. The interval of
+        the fraction of machines that meet the goal must lie at the required fraction or above. While the interval
+        leaves that open, further machines are measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal
@@ -570,7 +579,7 @@ class _Session:
 
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
-    """Return the settings against friction closest to the goal, combined with the bandwidth.
+    """Return the settings against friction closest to the goal, each with a varied bandwidth.
 
     They are tried only if no change of the controller alone works.
     """
@@ -584,7 +593,7 @@ def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
-    """Return the best point so far of an interrupted search, without verification."""
+    """Return the outcome of an interrupted search: its best settings so far, not verified."""
     if not search.tried:
         return outcome
     points = search.points
@@ -618,9 +627,9 @@ def _generations(budget: Budget) -> int:
 
 
 class _Report:
-    """Progress over all remedies, in steps.
+    """Report progress over all remedies, in steps.
 
-    A remedy that takes more steps than planned waits at the last of them.
+    A remedy that takes more steps than planned stays at the last of them.
     """
 
     def __init__(self, progress: Progress, total: int) -> None:

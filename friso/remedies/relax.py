@@ -25,7 +25,8 @@ from friso.stage import Stage
 class RelaxedGoal:
     """A goal relaxed in up to three parts, and a `remedy` that meets it.
 
-    It has the stage, the relaxed parts, and the product of the factors by which they are relaxed.
+    `stage` is that of the remedy, and `relaxations` are the parts. `factor` is the product of the factors by which they
+    are relaxed.
     """
 
     remedy: Remedy
@@ -35,10 +36,10 @@ class RelaxedGoal:
 
 
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
-    """Return the cheapest relaxation of each kind, the smallest first.
+    """Return the cheapest relaxation for each set of parts of the goal, the smallest first.
 
-    The distance from hunting is never relaxed: at the points considered, no surveyed machine hunts. If an allowance of
-    work is used up, remedies that come later are left out.
+    Only sets with the fewest parts are returned. The distance from hunting is never relaxed: at the points considered,
+    no surveyed machine hunts. If an allowance of work is used up, remedies that come later are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     with suppress(Exhausted):
@@ -55,7 +56,10 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations of one part for a remedy, or else of two or three."""
+    """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
+
+    If possible, each part is relaxed by a reasonable factor only; otherwise at least the bandwidth limit.
+    """
     settings = RemedySettings.current()
     needed = _needed(points, goal)
     far = [name for name, values in needed.items() if name != "within" and (values > settings.reasonable_factor).any()]
@@ -71,7 +75,10 @@ def _within(
     needed: Mapping[str, np.ndarray],
     limited: Sequence[str],
 ) -> Iterator[RelaxedGoal]:
-    """Return the cheapest relaxations for a remedy within the bounds of `limited` parts."""
+    """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
+
+    The parts `limited` may only be relaxed by a reasonable factor. `needed` has the factors that each point needs.
+    """
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
@@ -103,7 +110,10 @@ def _within(
 
 
 def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, within: float) -> RelaxedGoal:
-    """Build the goal relaxed for a point, with the tolerance wider by the factor `within`."""
+    """Build the goal that a point meets: the parts `names` are relaxed as far as it needs.
+
+    The tolerance is wider by the factor `within`.
+    """
     values = {
         "margin": ("modulus margin", float(point.margin[0]), ""),
         "settle": ("settling time", float(_time(point)[0]), "s"),
@@ -123,7 +133,8 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
     """Return the factors by which the tolerance must be wider at points, shape (points,).
 
-    Each is the first of a few factors with which the machines settle within the goal's time, if there is one.
+    A few factors are tried. The first with which the machines settle within the goal's time is taken, or else the
+    looser tolerance of the search.
     """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
@@ -141,7 +152,7 @@ def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet)
 
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
-    """Return the factors by which parts of the goal must be relaxed for each point."""
+    """Return for each part of the goal by which factor it must be relaxed at each point."""
     settings = RemedySettings.current()
     none = np.zeros(len(points.margin))
     limit = goal.bandwidth_limit
@@ -157,8 +168,8 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
 
 def _time(points: TriedPoints) -> np.ndarray:
-    """Return the settling time [s] within the tolerance.
+    """Return the settling time [s] of points within the tolerance.
 
-    If that is not met, it is the time within the looser tolerance.
+    A point that does not settle within it has the time within the looser tolerance.
     """
     return np.where(np.isfinite(points.settling), points.settling, points.looser)

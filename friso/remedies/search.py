@@ -1,7 +1,7 @@
 """Search the best points of one remedy, and survey whether the machines hunt there.
 
-The search is differential evolution (Storn and Price 1997, doi:10.1023/A:1008202821328), as in SciPy. Whole generations
-are simulated at once in the engine's lanes.
+A point is one value for each variable of the remedy. The search is differential evolution (Storn and Price 1997,
+doi:10.1023/A:1008202821328), as in SciPy. Whole generations of points are simulated at once.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ class Budget:
     """Sizes of a search: points, generations and machines.
 
     `points` counts the points of a generation for each variable. `refined` further generations search around the best
-    points. `machines` make the moves of the search and `surveyed` are surveyed for hunting; both are fewer than the
-    `fresh` machines on which an answer is measured. `further` machines are added if these leave the answer open.
+    points. `machines` make the moves of the search, and `surveyed` of them are surveyed for hunting. An answer is
+    measured on `fresh` machines, which are more. `further` machines are added if these leave the answer open.
     """
 
     points: int = 10
@@ -45,14 +45,14 @@ class Budget:
 
 @dataclass(frozen=True)
 class TriedPoints:
-    """Tried points, one in each row, and how the machines performed.
+    """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for 95 % of the machines: within the tolerance, within the looser one, and with the bandwidth lower
-    by the distance from hunting. Largest force [N] and least modulus margin hold for 95 % of the machines. The
-    bandwidth [Hz] is that of the stage file's machine (see `loop_bandwidth`). `nearness`, from 0 to 1, tells how near
-    the machines are to settling (see `Search.measured`). `moves_from` [m] is the smallest move from which all machines
-    settle; infinite if the largest move does not settle.
+    times [s] hold for 95 % of the machines. They are `settling` within the tolerance, `looser` within a looser one, and
+    `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest force [N] and least
+    modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the stage file's machine, where its loop
+    last crosses 0 dB. `nearness`, from 0 to 1, grows with the number of machines that settle or nearly settle.
+    `moves_from` [m] is the smallest move from which all machines settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -75,11 +75,11 @@ class TriedPoints:
         return cls(np.zeros((0, variables)), none, none, none, none, none, none, none, np.zeros(0, bool), none)
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
-        """Return the points with these numbers."""
+        """Return the points with these indices."""
         return TriedPoints(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
-        """Return for each constraint of the goal which points break it."""
+        """Return for each part of the goal, by name, which points break it."""
         return {
             "bandwidth": np.isfinite(_most(goal.bandwidth_limit)) & ~(self.bandwidth <= _most(goal.bandwidth_limit)),
             "margin": self.margin < goal.margin,
@@ -94,7 +94,7 @@ class TriedPoints:
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
-        """Return the numbers of points that serve only the larger moves, up to `largest` [m].
+        """Return the indices of points that serve only the larger moves, up to `largest` [m].
 
         They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
         """
@@ -106,7 +106,7 @@ class TriedPoints:
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
         """Return the cost of points: the settling time, or the quantity `wanted` if given.
 
-        For points that break constraints, the cost is the amount by which they do.
+        Points that break constraints cost more than all others, the more they break them.
         """
         settings = RemedySettings.current()
         excess = np.maximum(0, goal.margin - self.margin)
@@ -125,16 +125,16 @@ def _most(limit: float | None) -> float:
 
 @np.errstate(over="ignore")  # forces that are not finite are excluded elsewhere
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
-    """Return by which fraction values exceed a limit."""
+    """Return by which fraction values exceed a limit; 0 if they do not."""
     return np.maximum(0, values / _most(limit) - 1)
 
 
 @dataclass
 class Search:
-    """Search for the best points of a remedy on `machines`.
+    """Search for the best settings of a remedy, called points, on `machines`.
 
     Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
-    surveyed points at which machines hunt, or may hunt. `cut` tells that the search took too much work.
+    surveyed points at which machines hunt, or may hunt. `cut` is true if the search took too much work.
     """
 
     remedy: Remedy
@@ -151,19 +151,19 @@ class Search:
 
     @property
     def points(self) -> TriedPoints:
-        """Return the points that were tried on all machines."""
+        """Return the settings tried, without those that were stopped before all machines had moved."""
         return (begun := self.begun).take(np.flatnonzero(begun.whole))
 
     @property
     def begun(self) -> TriedPoints:
-        """Return all points that were tried, if any, including those that were stopped early."""
+        """Return all settings tried, if any, including those that were stopped early."""
         tried = self.tried or [TriedPoints.none(len(self.remedy.variables))]
         return TriedPoints(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in tried), strict=True)))
 
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
     ) -> None:
-        """Try points until they no longer improve, or until that takes too much work (`cut`).
+        """Try settings until they no longer improve, or until that takes too much work (`cut`).
 
         The search minimises the settling time, or the quantity `wanted`: a function from points (points, variables) to
         numbers (points,). A search of several variables may begin with the points `start`.
@@ -172,7 +172,7 @@ class Search:
             self._optimise(wanted, start)
 
     def tries(self, points: np.ndarray) -> Iterator[np.ndarray]:
-        """Try points (points, variables) in batches, and return those that break no constraint."""
+        """Try settings, as points (points, variables), in batches; yield those that meet the goal."""
         tuning = RemedySettings.current()
         for few in np.array_split(points, -(-len(points) // tuning.points_looked_at)) if len(points) else ():
             self.report(f"{self.remedy.name}: trying settings")
@@ -183,7 +183,10 @@ class Search:
             yield few[self.tried[-1].meets(self.goal)]
 
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield points (variables,) for inspection, until the next takes too much work (`cut`)."""
+        """Yield points (variables,) for closer study, until finding one takes too much work.
+
+        The search is then marked as `cut`.
+        """
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
         while True:
@@ -257,14 +260,14 @@ class Search:
             _evolve(cost, near, ends, self.budget.refined)
 
     def _is_hopeless(self, generation: int) -> bool:
-        """Tell whether no point comes near to settling after some generations."""
+        """Tell whether, after some generations, no settings let the machines nearly settle."""
         tuning, points = RemedySettings.current(), self.points
         return generation >= tuning.hopeless_generations and points.nearness.max() < tuning.hopeless_nearness
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
-        """Return the places between grid points where a variable reaches the bandwidth limit.
+        """Return coordinates between grid points at which a variable reaches the bandwidth limit.
 
-        The limit is reached from below.
+        The bandwidth rises through the limit there.
         """
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
@@ -280,20 +283,20 @@ class Search:
         return roots
 
     def _bandwidth(self, shares: np.ndarray) -> np.ndarray:
-        """Return the bandwidths of points (points, variables) on the stage file's machine [Hz]."""
+        """Return the bandwidths [Hz] of the stage file's machine at settings (points, variables)."""
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
     def measured(
         self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
     ) -> TriedPoints:
-        """Measure points on the machines.
+        """Simulate moves of the machines with each of several settings, and return how they perform.
 
-        Moves are simulated only if the loop is stable with half of the required margin, and a remedy of several
-        variables does not exceed the bandwidth limit by far: other moves chatter and take most of the work.
+        Moves are simulated only if the loop is stable with half of the margin required. A remedy of several variables
+        must also not exceed the bandwidth limit by far. Other moves chatter and take most of the work.
 
-        A point is nearer to settling the more machines settle within the tolerance, the looser one, and the tolerance
-        at the lower bandwidth, so that progress shows before any machine is in position. A point is stopped as soon as
-        it must cost more than `most`. The machines that are slowest most often are tried first.
+        A point is nearer to settling the more machines settle: within the tolerance, within the looser one, and within
+        the looser one at the lower bandwidth. So progress shows before any machine is in position. A point is stopped
+        as soon as it must cost more than `most`. The machines that are slowest most often are tried first.
         """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
@@ -342,9 +345,9 @@ class Search:
         return so_far()
 
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
-        """Return the points that break no constraint on any machine, the best first.
+        """Return the settings of a batch that meet the goal once all machines were run.
 
-        See `surveyed`.
+        The best come first: they settle soonest, or have the least `wanted`.
         """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
@@ -355,7 +358,10 @@ class Search:
         return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
-        """Tell at which points (points, variables) no machine hunts, shape (points,)."""
+        """Tell with which settings, (points, variables), the surveyed machines do not hunt.
+
+        The result has shape (points,). A fraction `goal.share` of these machines must be quiet.
+        """
         self.report(f"{self.remedy.name}: what attracts the machines")
         machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         least = self.goal.share
@@ -364,10 +370,10 @@ class Search:
         return np.asarray(clear)
 
     def share(self, shares: np.ndarray) -> np.ndarray:
-        """Return the fraction of fresh machines that meet the goal at points, (points,).
+        """Return the fraction of fresh machines that meet the goal with each of several settings.
 
-        Only moves and margins count. `shares` has shape (points, variables). If too many machines lack the margin, the
-        fraction with enough margin is returned.
+        Only moves and margins count. `shares` has shape (points, variables), the result (points,). If too many machines
+        lack the margin, the fraction with enough margin is returned.
         """
         self.report(f"{self.remedy.name}: on other machines")
         goal = self.goal
@@ -380,12 +386,12 @@ class Search:
         return np.asarray(meets.mean(axis=1))
 
     def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
-        """Yield the best points of shape (variables,) at which no machine hunts.
+        """Yield the best settings with which enough surveyed machines do not hunt (see `clear`).
 
-        Points that settle soonest, or have the least of the quantity `wanted`, come first. Enough fresh machines must
-        meet the goal. Nearly equal points count as one. After a batch without success, the next points are taken
-        farther away, because the best points are often at the limit of what works. If there are none, the point that
-        serves most fresh machines is yielded.
+        Settings are points of shape (variables,). Points that settle soonest, or have the least of the quantity
+        `wanted`, come first. Enough fresh machines must meet the goal. Nearly equal points count as one. After a batch
+        without success, the next points are taken farther away, because the best points are often at the limit of what
+        works. If no point has enough fresh machines, the one with the most is yielded.
         """
         settings = RemedySettings.current()
         points = self.begun
@@ -428,10 +434,10 @@ class Search:
             yield from best[self.clear(best)]
 
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
-        """Return better points near a point (variables,), the best first.
+        """Return better settings near a point (variables,), the best first.
 
         The point was taken because better ones failed: there machines hunted, or too few met the goal. New points are
-        drawn around the point, then around the point taken next.
+        chosen at random around the point, then around the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -459,9 +465,10 @@ class Search:
 
 
 def _smallest_move(settles: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the smallest move from which all machines settle, (points,).
+    """Return the smallest move [m] from which all larger ones settle too, shape (points,).
 
-    Moves have shape (points, machines). It is infinite where the machine with the largest move does not settle.
+    `settles` has shape (points, machines), and `sizes` [m] are the machines' moves. The result is infinite if the
+    largest move does not settle.
     """
     order = np.argsort(-sizes, kind="stable")
     count = np.logical_and.accumulate(settles[:, order], axis=1).sum(axis=1)
@@ -474,14 +481,14 @@ def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | Non
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell which points (points, variables) equal which of the others, (points, others)."""
+    """Tell for each point which of the others is equal to it, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the distance of points from the nearest other, (points,).
+    """Return the distance of points from the nearest of the others, shape (points,).
 
-    Points have shape (points, variables). The distance is infinite without others.
+    It is the largest difference of a coordinate; infinite without others.
     """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
@@ -493,7 +500,7 @@ def _evolve(
     generations: int,
     is_hopeless: Callable[[int], bool] = lambda generation: False,
 ) -> None:
-    """Run differential evolution from points (points, variables) between `ends`.
+    """Run SciPy's differential evolution from points (points, variables) between `ends`.
 
     A new point replaces its rival only if it costs less; `cost` receives the rival's cost so that it can stop early.
     After each generation, `is_hopeless` receives its number and may end the search.
@@ -529,7 +536,7 @@ def _evolve(
 
 
 def _agree(intermediate_result: Any) -> bool:
-    """Tell whether the points of a generation break no constraint and are equally good.
+    """Tell whether SciPy's search may stop: all points meet the constraints, at similar cost.
 
     Points that break constraints may all be equally bad; the search must then go on.
     """
@@ -539,7 +546,7 @@ def _agree(intermediate_result: Any) -> bool:
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """Return the first points, at most `most`, each at least `apart` from those before."""
+    """Return the first points, at most `most`, each more than `apart` from all others returned."""
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

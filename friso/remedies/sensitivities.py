@@ -54,7 +54,7 @@ TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmissio
 
 @dataclass(frozen=True)
 class EdgeDerivatives:
-    """Edge of hunting as a bandwidth [Hz], and its derivatives by keys [per SI unit], (keys,).
+    """The edge of hunting as a bandwidth [Hz], and its derivatives `by` keys [Hz/SI], (keys,).
 
     For a controller that states no bandwidth, the edge is a multiple of the present speed.
     """
@@ -80,9 +80,10 @@ class SettlingDerivatives:
 
 @dataclass(frozen=True)
 class MarginDerivatives:
-    """The least modulus margin of all settled states, and its derivatives [1/SI], (keys,).
+    """The least modulus margin of a stage's settled states, and its derivatives [1/SI], (keys,).
 
-    They hold for the state and the frequency at which the loop comes closest to -1.
+    Settled states are the limit cases, and all states stuck under a bias force. The derivatives hold for the state and
+    the frequency at which the loop comes closest to -1.
     """
 
     margin: float
@@ -91,7 +92,7 @@ class MarginDerivatives:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of cycle, edge of hunting, margin and settling time to keys of a stage.
+    """Derivatives of cycle, edge of hunting, margin and settling time by keys of a stage.
 
     `values` of the keys are in SI. A part is None if the stage has no such quantity, or none that is smooth. The
     settling time is also None if it was not asked for.
@@ -193,7 +194,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Return the stage with equations that contain all given keys.
+    """Return a stage's flat keys, changed so little that its equations contain all given `keys`.
 
     An exponent that is a whole number, for example, would otherwise be built in as a constant. Raises InputError for a
     key that equations never contain.
@@ -210,7 +211,10 @@ def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str
 def _of_edge(
     stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
 ) -> EdgeDerivatives | None:
-    """Return the derivatives of the edge; without `edge`, a check finds the edge first."""
+    """Return the derivatives of the edge; without `edge`, a check finds the edge first.
+
+    Returns None if there is no certain edge, or none that can be differentiated.
+    """
     edge = check_given(stage).judgement.margin if edge is None else edge
     moved = None if edge is None or not edge.certain else edge_derivatives(flat, keys, edge.factor, RTOL)
     if edge is None or moved is None:
@@ -224,10 +228,10 @@ def _of_edge(
 
 @np.errstate(all="ignore")
 def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
-    """Return the derivatives of the time at which the stage last enters the band `within` [m].
+    """Return the derivatives of the settling time into the band `within` [m], by the keys.
 
-    A derivative is the change of position there over the speed of entry. Returns None if neighbouring motions do not
-    follow.
+    A derivative is the change of position where the stage last enters the band, over its speed there. Returns None if
+    the time is not smooth, since neighbouring motions do not follow.
     """
     if not rests(flat):
         return None
@@ -303,9 +307,9 @@ def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray
 
 
 def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
-    """Return derivatives of the starting states to the keys, shape (states, keys).
+    """Return derivatives of the states in which a motion starts, shape (states, keys).
 
-    They are central differences of settled states.
+    They are central differences over small changes of the keys.
     """
     settings = RemedySettings.current()
     columns = []
@@ -320,7 +324,7 @@ def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...])
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
     """Return the least modulus margin and its derivatives by central differences.
 
-    Returns None if a settled state is unstable.
+    Returns None if the loop is unstable in a limit case, or stuck under a bias force.
     """
     settings = RemedySettings.current()
     members = settled_members(flat)
@@ -332,7 +336,7 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
     omega = np.array([2 * np.pi * closest.closest])
 
     def distance(changes: Mapping[str, float]) -> float:
-        """Return the distance of the loop from -1 at the changed keys."""
+        """Return the least distance of the loop from -1 if the keys are changed, at one frequency."""
         nearby = {**flat, **changes}
         return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
 

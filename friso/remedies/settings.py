@@ -30,7 +30,7 @@ class RemedySettings(Settings):
     """Values tried between the last two of a single key. They narrow the smallest change down by three halvings."""
 
     change_parts: tuple[float, ...] = setting((0.15, 0.3, 0.5, 0.7), "")
-    """Places between the smallest change and the working settings at which other points are tried."""
+    """Fractions of the way from the smallest change to the working settings at which other points are tried."""
 
     machine_factor: int = setting(2, "")
     """Factor on the number of machines for the smallest change. It lies at the limit of what works and often fails."""
@@ -84,10 +84,10 @@ class RemedySettings(Settings):
     """Machines that show the usual modulus margin. Fewer leave its second digit uncertain."""
 
     far_margin_share: float = setting(0.5, "")
-    """Fraction of the usual margin below which a machine is reported as far less robust."""
+    """Fraction of the usual margin below which a machine is left out of the few on which settings are tried."""
 
     few_share: float = setting(0.2, "")
-    """Fraction of the machines that may miss the goal which the answer calls a few."""
+    """Fraction, of the machines that may miss the goal, whose margins lie below what is usual."""
 
     relaxing_work: float = setting(8e8, "")
     """Work to find which settings serve large moves only and which part of the goal to relax, about 10 s on one core.
@@ -100,7 +100,7 @@ class RemedySettings(Settings):
     """Machines for relaxations, as many as in the search."""
 
     reasonable_factor: float = setting(3.0, "")
-    """Largest factor of a relaxation that is proposed."""
+    """Largest factor by which one part of the goal is relaxed, if that is possible."""
 
     wider_tolerances: tuple[float, ...] = setting((1.5, 2.0, 3.0, 5.0), "")
     """Factors of the tolerance that are proposed; the smallest that works is the answer."""

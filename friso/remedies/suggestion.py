@@ -19,15 +19,16 @@ from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
 DAMPING = (0.05, DAMPING_RATIOS[1])
-"""Force of the joints at their strokes over static friction, and damping ratios."""
+"""Damping ratios that are tried for a suggested joint."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` tells that the stage hunts neither at its bandwidth nor down to the distance below it. `margin` is the
-    least modulus margin of all settled states. If no joint settles, this is the last one tried.
+    `settles` is true if the stage hunts neither at its bandwidth nor below it, down to the distance that advice keeps.
+    `margin` is the least modulus margin of the limit cases, and of all states stuck under a bias force. If no joint
+    settles, this is the last one tried.
     """
 
     stage: Stage
@@ -39,7 +40,8 @@ class Suggestion:
 def suggestion(stage: Stage) -> Suggestion | None:
     """Return the isolator with the shortest of a few strokes that settles a stage.
 
-    It is the softest joint that does not move the cart. Returns None for a stage that has a joint or cannot have one.
+    At its stroke it pushes with a fixed fraction of static friction, so that the cart does not move. If none settles
+    the stage, the last one tried is returned. Returns None for a stage that has a joint or cannot have one.
     """
     settings = RemedySettings.current()
     if stage.joint:

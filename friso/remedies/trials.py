@@ -1,4 +1,4 @@
-"""Try points on machines, all machines at once in the engine's lanes."""
+"""Try points of a search, one value for each variable, on many machines at once."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """Return the settling time [s] that a fraction `share` of machines keeps, (points,)."""
+        """Return the time [s] within which a fraction `share` of machines settles, shape (points,)."""
         return quantile(self.settling, share)
 
 
@@ -56,9 +56,10 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 def moves_of_points(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0, rtol: float = RANKING
 ) -> Moves:
-    """Simulate the moves of points (points, variables), from 0 to 1 over a remedy's ranges.
+    """Simulate the moves of all machines with the settings of each point of a search.
 
-    The bandwidth is lower by the factor `slower`. `rtol` is the solver's relative tolerance.
+    `shares`, (points, variables), are coordinates from 0 to 1 over the remedy's ranges. The bandwidth is lower by the
+    factor `slower`. `rtol` is the solver's relative tolerance.
     """
     settings = RemedySettings.current()
     count = len(shares) * machines.count
@@ -77,7 +78,7 @@ def moves_of_points(
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Return sampling, delay and current loop of a stage as flat keys."""
+    """Return sampling, delay and current loop of a stage, as numbers in SI by key."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 
@@ -85,10 +86,11 @@ def timing(drive: Stage) -> dict[str, float]:
 def modulus_margins(
     remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
 ) -> np.ndarray:
-    """Return the limit cases' least modulus margin, (points, machines); 0 if unstable.
+    """Return the least modulus margin of the limit cases, (points, machines); 0 if unstable.
 
-    Sampling and delay are taken from the stage `drive`, and the bandwidth is lowered by the factor `slower`.
-    Controllers with other gains at standstill get the smaller margin of both sets.
+    `shares` are the points of a search, as coordinates. Sampling and delay are taken from the stage `drive`, and the
+    bandwidth is lowered by the factor `slower`. Controllers with other gains at standstill get the smaller margin of
+    both sets.
     """
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     flat = faster(flat, 1 / slower)
@@ -99,10 +101,10 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """Result of a survey for hunting of machines, with arrays of shape (points, machines).
+    """Which machines hunt at which points, as arrays of shape (points, machines).
 
-    `attracts` tells whether a machine hunts at its bandwidth or down to the distance below it. `decided` tells whether
-    simulations decided that, and `certain` whether in addition no other attractor can exist.
+    `attracts` is true if a machine hunts at its bandwidth, or at one lower by up to the goal's distance. `decided` is
+    true if the simulations sufficed to say so, and `certain` if in addition no other attractor can exist.
     """
 
     attracts: np.ndarray
@@ -111,11 +113,11 @@ class Attraction:
 
     @classmethod
     def none(cls, machines: int) -> Attraction:
-        """Return one point at which none of `machines` machines hunts."""
+        """Return the result for one point at which none of so many `machines` hunts, for certain."""
         return cls(np.zeros((1, machines), bool), *(np.ones((1, machines), bool) for _ in range(2)))
 
     def of_some(self, other: Attraction, machines: np.ndarray) -> Attraction:
-        """Return a copy in which the numbered machines have another result."""
+        """Return a copy in which the `machines` with these indices have the results of `other`."""
         columns = {name: column.copy() for name, column in vars(self).items()}
         for name, column in columns.items():
             column[:, machines] = getattr(other, name)
@@ -141,12 +143,12 @@ def attraction(
     enough: float | None = None,
     at_once: bool = False,
 ) -> Attraction:
-    """Survey whether the machines hunt at points.
+    """Survey whether machines hunt at points of a search, given by coordinates `shares`.
 
     Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance. The lowest
     bandwidth comes first, because most machines hunt there; or all come `at_once`, which is faster if hardly any
-    machine hunts. An undecided bandwidth ends the survey of a machine, and a point with fewer than the fraction
-    `enough` of quiet machines ends with it. Simulations start from many states; closed orbits confirm the final answer.
+    machine hunts. An undecided bandwidth ends the survey of a machine. A point ends with fewer than the fraction
+    `enough` of quiet machines. Simulations start from many states; closed orbits confirm the final answer.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

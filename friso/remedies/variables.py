@@ -14,7 +14,7 @@ from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
 KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
-"""Function from the flat keys so far and the values of a variable to the keys that change."""
+"""Function that takes the keys so far, in SI, and values of a variable, and returns the keys that change."""
 
 BANDWIDTH = "bandwidth"
 """Name of the variable that makes the whole controller faster."""
@@ -49,18 +49,21 @@ class Variable:
 
 
 def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
-    """Return a variable that is a key of the stage file."""
+    """Return a key of the stage file as a variable between `low` and `high`.
+
+    It takes exactly the `present` value close to it; NaN means that there is none.
+    """
     return Variable(key, low, high, lambda flat, value: {key: value}, present)
 
 
 def bandwidth_factor(present: float = float("nan")) -> Variable:
-    """Return the speed of the whole controller as a variable, in units of the present speed."""
+    """Return the bandwidth of the whole controller as a variable: a factor on the present one."""
     settings = RemedySettings.current()
     return Variable(BANDWIDTH, settings.slowest_factor, settings.fastest_factor, sped_up, present)
 
 
 def gains(stage: Stage) -> tuple[Variable, ...]:
-    """Return the ratios of a controller's gains, then its bandwidth, as variables."""
+    """Return as variables the numbers that shape the controller, then its bandwidth."""
     settings = RemedySettings.current()
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
@@ -70,7 +73,10 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:
-    """Return stroke, stiffness and damping of an isolator for the least static friction [N]."""
+    """Return stroke, stiffness and damping of an isolator as variables.
+
+    Their ranges follow from the least static `friction` [N].
+    """
 
     settings = RemedySettings.current()
 

@@ -36,13 +36,13 @@ Certainty = Literal["works", "large moves", "unsure", "given up", "does not work
 
 @dataclass(frozen=True)
 class Performance:
-    """Measurements of a stage on machines, in rows of one point.
+    """How a stage performs on machines, as arrays with a single row.
 
-    They are its `moves`, the modulus margins, and whether the machines hunt. `own_margin` is the least modulus margin
-    of the stage itself in all settled states, and `stiffness` [N/m] its stiffness against a load. For `further`
-    machines, shape (n,), it is only stored whether they meet the whole goal. `sizes` [m] are the moves of all machines,
-    the further ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which
-    machines hunt.
+    It holds `moves`, modulus margins, and whether the machines hunt. `own_margin` is the least modulus margin of the
+    stage itself in all settled states, and `stiffness` [N/m] its stiffness against a load. For `further` machines,
+    shape (n,), only whether they meet the whole goal is stored. `sizes` [m] are the moves of all machines, the further
+    ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which machines
+    hunt.
     """
 
     moves: Moves
@@ -61,11 +61,17 @@ class Performance:
         return self.margin.size + self.further.size
 
     def slowest(self, goal: Goal) -> float:
-        """Return the time [s] in which 95 % of machines and moves settle; infinite if they do not."""
+        """Return the time [s] in which enough machines settle, the fraction `goal.share`.
+
+        It is infinite if they do not.
+        """
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
-        """Return the 95 % interval of the time in which 95 % settle, from sampled machines."""
+        """Return the 95 % interval of the time [s] in which enough machines settle (`goal.share`).
+
+        It allows for the few machines that were drawn.
+        """
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
@@ -106,8 +112,8 @@ class Performance:
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
         """Return the smallest and largest move [m] between which the goal holds, or None.
 
-        Of any number of moves next to either end, at least the required fraction meets the goal. The result is None if
-        there are no such moves, or the moves are unknown.
+        Of the moves next to either end, however many are taken, at least the required fraction meets the goal. The
+        result is None if there are no such moves, or if the moves are unknown or were not surveyed for hunting.
         """
         order = np.argsort(self.sizes, kind="stable")
         if self.moves_drawn is None or not order.size or not self.is_surveyed:
@@ -138,10 +144,10 @@ class Performance:
         return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
 
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
-        """Return the performance after a survey of the machines that meet all other parts.
+        """Survey machines for hunting, and return the performance with the results.
 
-        The survey looks for hunting. A few machines are surveyed first. If so many of them hunt that too few can meet
-        the goal, the others are left out: the fraction is then one of fewer machines.
+        Only machines that meet all other parts of the goal are surveyed, a few of them first. If so many of these hunt
+        that too few can meet the goal, the others are left out: the fraction is then one of fewer machines.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
@@ -152,7 +158,10 @@ class Performance:
     def _surveyed(
         self, stage: Stage, machines: Fleet, numbers: np.ndarray, goal: Goal, at_once: bool = False
     ) -> Performance:
-        """Return the performance after surveying numbered machines that meet all other parts."""
+        """Survey the machines with indices `numbers` for hunting, if they meet all else.
+
+        Returns the performance with the results.
+        """
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:
             return self
@@ -160,14 +169,17 @@ class Performance:
         return replace(self, attraction=self.attraction.of_some(surveyed, some))
 
     def _first(self, count: int) -> Performance:
-        """Return the measurements of the first machines only."""
+        """Return the performance of the first `count` machines only."""
         moves = Moves(*(column[:, :count] for column in vars(self.moves).values()))
         attracted = Attraction(*(column[:, :count] for column in vars(self.attraction).values()))
         margin, sizes = self.margin[:, :count], self.sizes[:count]
         return replace(self, moves=moves, margin=margin, attraction=attracted, sizes=sizes)
 
     def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-        """Return the performance with further machines measured."""
+        """Return the performance with `further` machines added.
+
+        Of these, only whether they meet the goal is kept.
+        """
         moved = replace(self, **_measured(stage, machines, goal, drive))
         meets = moved._surveyed(stage, machines, np.arange(machines.count), goal, at_once=True)._meets_all(goal)
         sizes = np.append(self.sizes, machines.sizes)
@@ -175,10 +187,10 @@ class Performance:
 
 
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
-    """Return the first and last place of the run of places that best meets the goal.
+    """Return the first and last index of the stretch of moves that best meets the goal.
 
-    Each part of the run that touches one of its ends meets the goal with at least the required fraction. Returns None
-    if no run is long enough to show that.
+    `meets` is true where a move meets it, in ascending order of moves. Any part of the stretch at either of its ends
+    has at least the required fraction `share`. Returns None if no stretch is long enough to show that.
     """
     if meets.all():
         return 0, len(meets) - 1
@@ -191,14 +203,14 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class RemedyOutcome:
-    """Outcome of a remedy: its best `stage`, the performance, and whether it surely works.
+    """Outcome of a remedy: its best `stage`, how machines perform with it, and whether it works.
 
     `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; if there are none, it works.
     `windows` give how far each number may vary. `confirmation` is the search for hunting of the stage itself; None if
     too many machines miss the goal.
 
     `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
-    coordinates of the stage in the remedy's ranges. `cut` tells that the search took too much work, and `untried` that
+    coordinates of the stage in the remedy's ranges. `cut` is true if the search took too much work, and `untried` if
     other remedies had taken all of it. `moves_from` [m] is the smallest move for which the stage was verified, if it
     serves large moves only.
     """
@@ -219,9 +231,9 @@ class RemedyOutcome:
 
     @property
     def certainty(self) -> Certainty:
-        """Return whether the remedy works: surely, not surely, or not at all.
+        """Return whether the remedy works: surely, for large moves only, not surely, or not at all.
 
-        A search without result may also have run out of work.
+        The result is "given up" if a search without result ran out of work.
         """
         if self.interrupted:
             return "unsure"
@@ -236,7 +248,7 @@ class RemedyOutcome:
 
 @np.errstate(all="ignore")
 def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
-    """Measure a stage's moves and margins on machines, without a survey (see `surveyed`)."""
+    """Measure a stage's moves and margins on machines, without looking for hunting."""
     flat = stage.flat()
     return Performance(
         **_measured(stage, machines, goal, drive),
@@ -248,7 +260,10 @@ def moving(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performan
 
 
 def _measured(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> dict[str, Any]:
-    """Measure moves and margins on machines, by field of `Performance`, without a survey."""
+    """Measure moves and margins on machines, without looking for hunting.
+
+    The results have the names of fields of `Performance`.
+    """
     remedy = Remedy.settled_on("", stage)
     return {
         "moves": moves_of_points(remedy, ONE, machines, goal, rtol=RemedySettings.current().move_rtol),
@@ -296,7 +311,10 @@ def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goa
 
 
 def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return the parts of the goal that too many machines miss."""
+    """Return the parts of the goal that too many machines miss.
+
+    If it is no single part, but all together that too many miss, the result is "together".
+    """
     parts = measured.meets(goal)
     listed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
     if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.surely(measured.count):

@@ -18,7 +18,7 @@ class VariableWindow:
     """Range of a variable around its tuned `value`, in which machines meet the goal.
 
     The range is from `low` to `high`. All three are in SI, or factors; everything else is as tuned. `open_below` and
-    `open_above` tell that the range reaches an end of the search.
+    `open_above` are true if the range reaches an end of the search.
     """
 
     name: str
@@ -30,10 +30,11 @@ class VariableWindow:
 
 
 def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
-    """Return the windows around a point, shape (variables,), on the machines of the search.
+    """Return in which range each variable works, the others staying at a point, (variables,).
 
-    Moves and margins are tried on a grid, and the ends are refined by bisection, then drawn in until no machine hunts
-    there. Returns None if the point itself misses the goal on these machines, or takes too much work.
+    Moves and margins are tried on a grid on the machines of the search. The ends are refined by bisection, then drawn
+    in until enough surveyed machines do not hunt there. The result is empty if the point itself misses the goal on
+    these machines, or if this takes too much work.
     """
     settings = RemedySettings.current()
     variables, grid = search.remedy.variables, np.linspace(0, 1, settings.window_points)
@@ -78,9 +79,10 @@ def _halve(
     does: Callable[[np.ndarray, np.ndarray], np.ndarray],
     halvings: int,
 ) -> None:
-    """Bisect between the last places that work and the next ones that do not, (variables, 2).
+    """Bisect between coordinates `inside` that work and `outside` that do not, changing both.
 
-    `does` tells whether places work. `ends` selects some of the ends by numbers of variables and sides, (n, 2).
+    Both have shape (variables, 2), for a lower and an upper end. `does` tells which coordinates work. `ends` selects
+    the ends to refine by indices of variable and side, (n, 2).
     """
     rows, sides = ends.T
     for _ in range(halvings if len(ends) else 0):
@@ -92,21 +94,25 @@ def _halve(
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Tell whether points meet the goal by moves and margins, each with one variable moved.
 
-    `numbers` (n,) select the variables, and `places` (n,) are their new coordinates.
+    `numbers` (n,) are the indices of the variables, and `places` (n,) their new coordinates from 0 to 1.
     """
     worst = RemedySettings.current().worst_time  # points that break a constraint cost more
     return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
 
 
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether no machine hunts at points with one variable each moved."""
+    """Tell at which points enough surveyed machines do not hunt (`Search.clear`), shape (n,).
+
+    Each point has one variable moved: `numbers` (n,) are the indices of the variables, and `places` (n,) their new
+    coordinates from 0 to 1.
+    """
     if not len(places):
         return np.ones(0, bool)
     return search.clear(_moved(shares, numbers, places))
 
 
 def _moved(shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return points with one variable each, numbered `numbers` (n,), moved to `places` (n,)."""
+    """Return copies of a point, each with variable `numbers[k]` moved to coordinate `places[k]`."""
     tried = np.repeat(shares[None], len(places), axis=0)
     tried[np.arange(len(places)), numbers] = places
     return tried

@@ -1,1 +1,4 @@
-"""Functions of this package, one module each, which answer like friso's own."""
+"""The commands `guideline` and `reproduce` as functions, one folder each.
+
+Each returns an `Answer`, as all functions of friso with a command do.
+"""

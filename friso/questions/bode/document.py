@@ -64,7 +64,7 @@ def _margins(margins: Margins) -> dict[str, Any]:
 
 
 def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
-    """Return the margins of a state of the family, and which state it is."""
+    """Return the margins of one state of friction, and which state it is."""
     at = {
         "bias_n": float(member.bias[0]),
         "speed_m_per_s": float(member.speed[0]),
@@ -75,14 +75,14 @@ def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
 
 
 def _limiter(bode: Bode, touched: bool) -> str | None:
-    """Return the side of the limiter, or None for a stage whose limiter has only one state."""
+    """Return the state of the limiter, "free" or "touched"; None if it can have only one."""
     return side(touched) if has_limiter(bode) else None
 
 
 def _limits(margins: Limits, unit: str) -> dict[str, Any]:
-    """Return the ranges of the crossover that are stable or have a good modulus margin.
+    """Return the crossovers at which the loop is stable, or has a good modulus margin.
 
-    `unit` is part of the names: "hz", or "factor" for multiples of the bandwidth.
+    `unit` is a part of each key of the result: "hz", or "factor" for multiples of the bandwidth.
     """
     return {
         f"highest_stable_crossover_{unit}": margins.highest_stable,

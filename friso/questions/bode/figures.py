@@ -1,6 +1,6 @@
 """Draw a linear analysis: plant, open loop, Nyquist plot and sensitivity.
 
-Each figure shows the limit cases, and some show the whole family of states behind them.
+Each figure shows the limit cases. Some also show the family: the loop in many states of friction, stuck and sliding.
 """
 
 from __future__ import annotations
@@ -71,12 +71,12 @@ def bode_figures(bode: Bode) -> tuple[Figure, ...]:
 
 
 def first_figures(bode: Bode) -> tuple[Figure, ...]:
-    """Return the figures of the limit cases alone, which need less time than the family."""
+    """Return the figures of the limit cases alone, which need less time than all states."""
     return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
 
 
 def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
-    """Name the stage in figures, and leave out figures without panels."""
+    """Write the stage's name on each figure, and drop figures without panels."""
     return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
@@ -194,12 +194,12 @@ def _speeds(bode: Bode) -> Figure:
 
 
 def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
-    """Return the curve of a loop, dashed and labelled if the loop is unstable."""
+    """Return the curve of a loop; if the loop is not `stable`, dash it and say so in its label."""
     return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
 
 
 def _nyquist(bode: Bode) -> Figure:
-    """Draw the open loop near -1: the limit cases, with the family behind them."""
+    """Draw the open loop near -1: the limit cases, with all states of friction behind them."""
     family = [
         *_family(bode, True, "stable states of the family", LIGHT),
         *_family(bode, False, "unstable states of the family", LOST),
@@ -224,7 +224,10 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Return evenly picked stable or unstable members of the family, where they are in view."""
+    """Return Nyquist curves of some stable or unstable states of friction, evenly picked.
+
+    Only the parts near -1 are kept. The first curve is called `name` in the legend; all have the colour `shade`.
+    """
     numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
@@ -236,7 +239,7 @@ def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
 
 
 def _sensitivity(bode: Bode) -> Figure:
-    """Draw the sensitivity of the stable limit cases, and the band of the stable family."""
+    """Draw the sensitivity of the stable limit cases, and the band of all stable states behind."""
     stable = bode.scan.stable
     lines = tuple(
         Series(_hertz(bode), -magnitude(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
@@ -278,7 +281,7 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
 
 
 def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
-    """Return the panel of a measure of size, such as [dB], over frequencies (k,) [Hz]."""
+    """Return the panel of what `of` computes from responses, such as dB, over frequencies [Hz]."""
     lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
     return Panel("", Axis.of_frequency(hertz), axis, tuple(lines))
 

@@ -23,10 +23,10 @@ _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
 
 @dataclass(frozen=True)
 class ShownState:
-    """A state with its margins, label and colour.
+    """A state of the loop with its margins, label and colour.
 
-    `where` describes the state if the label does not. `loops` has the margins of each loop of a cascade in a limit
-    case.
+    `where` describes the state if the label does not. `loops` has the margins of each loop of a cascade; it is empty
+    unless the state is a limit case.
     """
 
     label: str
@@ -37,9 +37,10 @@ class ShownState:
 
 
 def shown_states(bode: Bode) -> tuple[ShownState, ...]:
-    """Return the states shown: the limit cases, the worst settled state, and the worst of all.
+    """Return the limit cases, the worst settled state, and the worst state of all.
 
-    The worst of all is left out if it is the worst settled state.
+    Settled states are the limit cases, and all states stuck under a bias force. The worst of all is left out if it is
+    settled. Without friction, there are only limit cases.
     """
     cases = [
         ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
@@ -89,7 +90,7 @@ def in_words(cart: str, touched: bool, limited: bool) -> str:
 def cart(member: Members, bode: Bode) -> str:
     """Say what the cart does: it sticks, or slides at a speed; empty without friction.
 
-    The highest speed stands for fast sliding, where friction no longer falls. No motion need reach this speed.
+    The highest speed analysed is called fast sliding: friction no longer falls there, and no motion need be so fast.
     """
     if not has_friction(bode):
         return ""

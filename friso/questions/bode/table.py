@@ -24,7 +24,7 @@ ANY = "no limit"
 
 
 def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table; rows in which no state has an entry are left out."""
+    """Return the rows of the table, one text for each state; rows without entries are left out."""
     texts = [("State", [item.where or NOTHING for item in states])]
     texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]
     for loop in get_args(CascadeLoop):
@@ -58,9 +58,9 @@ def growth(margins: Margins) -> str:
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
-    """Write a margin in words.
+    """Write a margin by `text`, or say that any change is allowed or the margin is not known.
 
-    `none` is the margin's value if no change of gain, phase or delay reaches the edge of stability.
+    Any change is allowed if the margin equals `none`.
     """
     if math.isnan(value):
         return NOTHING
@@ -73,7 +73,7 @@ def _factor(value: float) -> str:
 
 
 def _signed(size: float, sign: str = "") -> str:
-    """Write a size [dB], never as minus zero."""
+    """Write a number in dB, never as minus zero; `sign` = "+" adds a plus."""
     return f"{round(size, 1) + 0.0:{sign}.1f} dB".replace("-", "−")
 
 

@@ -42,7 +42,8 @@ def sentences(bode: Bode) -> list[str]:
 def stability(bode: Bode) -> list[str]:
     """Say whether the loop is stable in the settled states, and with which margin.
 
-    Further sentences say whether the loop is stable in all other states, and why not.
+    Settled states are the limit cases, and all states stuck under a bias force. Further sentences say whether the loop
+    is stable in all other states, and why not.
     """
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]
@@ -127,7 +128,7 @@ def _crossing(bode: Bode) -> bool:
 
 
 def _subject(bode: Bode) -> str:
-    """Say in which measure the bandwidth is given."""
+    """Say in what the bandwidth is given: in crossovers, or multiples of the present bandwidth."""
     return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
 
 
@@ -137,7 +138,7 @@ def _unit(bode: Bode) -> str:
 
 
 def _states_checked(bode: Bode) -> str:
-    """Describe the family of states that were checked."""
+    """Describe which states of friction were checked."""
     members = bode.scan.members
     parts = []
     if has_friction(bode):
@@ -202,7 +203,11 @@ def _limits(bode: Bode, name: str) -> str:
 
 
 def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
-    """Name the state that limits a range of crossovers, or the state for which there is no range."""
+    """Name in brackets the state that is unstable first, or closest to -1, as bandwidth rises.
+
+    `member` is this state (None: nothing is said), and `meaning` says which of both it is. `end` is the bandwidth above
+    which that holds; without one, it holds for the stage as given.
+    """
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
@@ -211,7 +216,7 @@ def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Memb
 
 
 def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
-    """Write ranges of the bandwidth in words; say so if there is none."""
+    """Write ranges of the bandwidth in words; without any, say in which range none was found."""
     unit = _unit(bode)
     windows = [window_with_unit(*window, limits.searched, unit) for window in ranges]
     return listed(windows, "and") or f"none from {range_with_unit(*limits.searched, unit)}"

@@ -27,7 +27,7 @@ def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> di
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
-    """Return the special points, the branches of cycles, and the verdicts at both ends of one key."""
+    """Return flips, folds and other special points, branches, and the verdicts at both ends."""
     branches = lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
@@ -40,7 +40,7 @@ def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
 
 
 def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
-    """Return a special point of a branch: its value, kind, error, and the cycle there."""
+    """Return a special point of a branch, such as a fold: its value, kind, error, and cycle."""
     return {
         "value": key.number(line.at[k, 0]),
         "kind": line.kinds[k],

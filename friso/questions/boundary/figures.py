@@ -77,7 +77,7 @@ MARGIN = 0.02
 
 
 def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
-    """Return the figure of a boundary; special points are named in the units shown."""
+    """Return the figure of a boundary; points such as folds are named in the units shown."""
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
     return replace(figure, subject=subject)
 
@@ -103,7 +103,7 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
-    """Draw one measure of all branches with their special points.
+    """Draw one measure of all branches, with their flips, folds and other special points.
 
     Labels are added if there is a key.
     """
@@ -169,7 +169,7 @@ def _plane(traced: Plane) -> Figure:
 
 
 def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, symbol: Symbol) -> tuple[Markers, ...]:
-    """Return marks at places in the plane [SI], each of shape (2,); nothing for no places."""
+    """Return marks at points in the plane of two keys [SI], shape (n, 2); nothing for no points."""
     x, y = np.reshape(places, (-1, 2)).T
     return (Markers(x, y, label, colour, symbol),) if x.size else ()
 

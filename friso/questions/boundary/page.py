@@ -37,9 +37,9 @@ def boundary_html(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: St
 
 
 def _write_table(traced: Diagram | Plane, path: Path) -> None:
-    """Write a CSV table with one row per point of a line.
+    """Write a CSV table with one row per point of a branch or curve.
 
-    Special points have a kind and an error.
+    Flips, folds and other special points also have a kind and an error.
     """
     import pandas as pd
 

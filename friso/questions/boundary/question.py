@@ -58,7 +58,7 @@ class BoundaryAnswer(Answer):
         return [conclusion(self.result, self.keys)]
 
     def details(self) -> Sequence[str]:
-        """Return a sentence on every special point, branch and curve."""
+        """Return a sentence on every branch or curve, and on flips, folds and other special points."""
         from friso.questions.boundary.words import sentences
 
         return sentences(self.result, self.keys)[1:]

@@ -87,7 +87,7 @@ class ShownKey:
         return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
-        """Write the lowest and highest of some values [SI] that lie in a range."""
+        """Write the lowest and highest of some values [SI], cut to the range `swept`."""
         low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
         return self._with_unit(f"{low:.6g} to {high:.6g}")
 
@@ -150,7 +150,7 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
-    """Describe an edge of hunting that runs across the whole plane.
+    """Describe an edge of hunting that runs across the whole plane of two keys.
 
     The sentence gives the values of one key at both ends of the other, and the farthest values in between.
     """
@@ -158,12 +158,12 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
     side, other = ("below", "above") if edge.below else ("above", "below")
 
     def ends(k: int) -> str:
-        """Write the value or range of values at which hunting ends, at a place across."""
+        """Write the value of one key at which hunting ends, or a range, at point `k` along the edge."""
         low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
         return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
 
     def at(k: int) -> str:
-        """Write the value of the other key at a place across."""
+        """Write the value of the other key at point `k` along the edge."""
         return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
@@ -185,7 +185,7 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where a curve runs, and how it ends there."""
+    """Say from where to where the curve with this index runs, and how it ends there."""
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
@@ -256,7 +256,8 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
     """Say between which of the values tried a cycle attracts as well.
 
-    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order.
+    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
+    errors [SI].
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
@@ -278,7 +279,7 @@ def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
 def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
     """Say at which value, or between which values, hunting begins or ends.
 
-    `errors` holds the errors of special points [SI] by their values.
+    `errors` holds errors [SI] by the values of flips, folds and other special points.
     """
     if change.low == change.high:
         return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
@@ -286,14 +287,14 @@ def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, floa
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
-    """Describe each special point and each branch over one key."""
+    """Describe each branch over one key, and its flips, folds and other special points."""
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
     return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
-    """Say what happens to a cycle at a special point as the key rises."""
+    """Say what happens to a cycle at a flip, fold or other special point as the key rises."""
     value = float(line.at[k, 0])
     above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
     goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)
@@ -320,7 +321,7 @@ def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
 
 
 def end_sentence(traced: Diagram, key: ShownKey) -> str:
-    """Give the verdicts at both ends of the range."""
+    """Give the verdicts at both ends of the key's range."""
     swept = traced.space.ranges[0]
     first, last = end_verdicts(traced)
     return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
@@ -357,13 +358,13 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say where a change was found but no curve could be started."""
+    """Say near which points hunting changes although no curve could be followed from there."""
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
 def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Write a place in the plane as values of both keys."""
+    """Write a point in the plane of two keys, given by its `values` [SI]."""
     return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
 
 

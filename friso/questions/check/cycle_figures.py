@@ -48,7 +48,7 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _return_map(item: ShownCase) -> list[Panel]:
-    """Return the panel of a case's return map; none if swings were not followed.
+    """Return the panel of a stage's return map; none if swings were not followed.
 
     It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
     """
@@ -79,9 +79,10 @@ def _mirrored(hunting: Hunting) -> bool:
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
-    """Return strips over the distances up to `reach` [m] from which hunting goes on for ever.
+    """Return strips of distances, up to `reach` [m], from which a stage ends in hunting.
 
-    The return map is followed from swing to swing. The stage has to be its own mirror image.
+    From sticking at one of the `distances`, the stage next sticks at one of the `returns` [m] on the other side. Both
+    sides must behave alike. These returns are followed over many swings.
     """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts
@@ -132,10 +133,7 @@ def cycle_figure(cases: list[ShownCase]) -> Figure:
 
 
 def _cycle_panels(item: ShownCase) -> list[Panel]:
-    """Return the panels of a case's cycles.
-
-    They show position and force over time, and velocity over position.
-    """
+    """Return panels of a stage's cycles: position and force over time, velocity over position."""
     cycles = item.case.judgement.hunting.cycles
     time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
     names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]

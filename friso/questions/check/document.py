@@ -28,7 +28,7 @@ def check_document(
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
 ) -> dict[str, Any]:
-    """Return the cases with their verdicts as a JSON document.
+    """Return the verdicts as a JSON document: as given, with the joint locked and free.
 
     Results on drawn stages, on an isolator and across friction laws are added if they were computed.
     """
@@ -67,7 +67,7 @@ def _feeding(feeding: Feeding) -> dict[str, Any]:
 
 
 def _case(case: Case) -> dict[str, Any]:
-    """Return everything known about one case: verdict, run, cycle, margins and basins."""
+    """Return all results for one state of the joint: verdict, run, cycle, margins and basins."""
     into_1um, into_10um = case.settling_time.values()
     last_1um, last_10um = case.in_the_end.values()
     judgement = case.judgement
@@ -200,7 +200,7 @@ def joint_margins_document(stage: Stage, margins: Mapping[str, ParameterMargin])
 
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:
-    """Return the verdicts of the stages drawn, for one case."""
+    """Return the verdicts on the stages drawn, with the joint as given, locked or free."""
     from friso.hunting.criteria import ATTRACTED, VERDICT_CRITERION
 
     fates = draws.fates[case]

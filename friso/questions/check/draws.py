@@ -1,4 +1,4 @@
-"""Show what stages drawn from an uncertain one do: in the table, in sentences and in a figure."""
+"""Show what machines drawn from uncertain keys do: in the table, sentences and a figure."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ MOST_LISTED = 4
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table of draws, with one text per case."""
+    """Return the table's rows on machines drawn from uncertain keys.
+
+    Each has a text for the joint as given, locked and free.
+    """
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
         ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
@@ -52,7 +55,10 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 
 
 def draws_sentences(draws: Draws) -> list[str]:
-    """Say what the draws do, in one sentence per case, and which draws were left out."""
+    """Say what the machines drawn do, with the joint as given, locked and free.
+
+    Then say which were left out.
+    """
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
     cases = case_labels(draws.stage).items()
@@ -66,7 +72,7 @@ def draws_sentences(draws: Draws) -> list[str]:
 
 
 def _swings(fates: Fates) -> str:
-    """Write the ranges of amplitude and period with which draws hunt; "" if none does."""
+    """Write the ranges of amplitude and period of the machines that hunt; "" if none does."""
     amplitudes, periods = (values[np.isfinite(values)] for values in (fates.amplitudes, fates.periods))
     if not amplitudes.size:
         return ""
@@ -78,7 +84,7 @@ def _swings(fates: Fates) -> str:
 
 
 def _edge(draws: Draws) -> str:
-    """Write between which bandwidths the draws' edges of hunting lie; "" if not known."""
+    """Write in which range of bandwidths hunting of the machines drawn ends; "" if not known."""
     drawn_edges = draws.edges
     if drawn_edges is None or not np.isfinite(drawn_edges.low).any():
         return ""
@@ -89,9 +95,9 @@ def _edge(draws: Draws) -> str:
 
 
 def _narrowed(draws: Draws) -> str:
-    """Say which measurement would narrow the ranges most; "" where it is not known.
+    """Say which key should be measured to narrow the ranges most; "" if this is not known.
 
-    The measurement is of the key with which amplitudes correlate most.
+    It is the key with which the amplitudes of hunting correlate most.
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))
@@ -108,7 +114,10 @@ def _narrowed(draws: Draws) -> str:
 
 
 def _sentence(name: str, draws: Draws) -> str:
-    """Say with which probability a case hunts, how far, and which key matters most."""
+    """Say with which probability the stage hunts, how far, and which key matters most.
+
+    `name` is the case: "given", "locked" or "free".
+    """
     fates = draws.fates[name]
     open_ones = {word: fates.counts[word] for word in UNDECIDED if fates.counts[word]}
     keys = fates.separations(draws.sample.keys)
@@ -139,7 +148,10 @@ def _sentence(name: str, draws: Draws) -> str:
 
 
 def draws_figure(draws: Draws) -> Figure:
-    """Draw the verdicts as stacked bars over the most influential key, case by case."""
+    """Draw stacked bars of the verdicts on machines over the most influential key.
+
+    There is a panel for each state of the joint.
+    """
     panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
         f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
@@ -149,7 +161,10 @@ def draws_figure(draws: Draws) -> Figure:
 
 
 def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
-    """Return the stacked bars of one case over the key that best separates its verdicts."""
+    """Draw stacked bars of the verdicts on machines over the key that best separates them.
+
+    The key is one of the uncertain keys from which machines were drawn.
+    """
     keys = draws.sample.keys
     key = next(iter(fates.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)

@@ -34,7 +34,7 @@ def _course(name: str, decline: Decline) -> str:
 
 
 def _doubt(*declines: Decline) -> list[str]:
-    """Return a sentence if the result is not certain; nothing otherwise."""
+    """Return a sentence if the result is not certain; an empty list otherwise."""
     certain = all(decline.certain for decline in declines)
     doubt = "That is not certain: some simulations were given up, or swings too small for them to see may last."
     return [] if certain else [doubt]

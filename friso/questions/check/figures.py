@@ -43,9 +43,9 @@ _PERIODS = 4  # number of hunting periods that the figure of force terms shows
 
 
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
-    """Return every figure for which the cases have data, the most telling first.
+    """Return every figure for which a check has data, the most telling first.
 
-    Cases without traces have no figures.
+    Without time responses, there are none.
     """
     with_trace = [item for item in shown_cases(cases) if item.case.trace is not None]
     if not with_trace:
@@ -98,9 +98,9 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Draw the deviation after the move with its counted peaks (thesis, Fig.
+    """Draw the deviation after the move with its counted peaks, and the settling.
 
-    5), and the settling.
+    It is Fig. 5 of the thesis.
     """
     start, end = _window(cases)
     lines, peaks = [], []
@@ -148,7 +148,10 @@ def _settling(cases: list[ShownCase]) -> Panel:
 
 
 def _overview(cases: list[ShownCase]) -> Figure:
-    """Draw reference, position and actuator force over the whole run, with the cases side by side."""
+    """Draw reference, position and actuator force over the whole run.
+
+    The joint as given, locked and free stand side by side.
+    """
     view = common_range([samples(trace_of(item), "position") for item in cases], least=2 * min(BANDS))
     panels = []
     for item in cases:
@@ -170,7 +173,7 @@ def _overview(cases: list[ShownCase]) -> Figure:
 
 
 def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
-    """Return the controller's force limit if a case comes near it.
+    """Return the controller's force limit if a run comes near it.
 
     A distant limit would flatten all curves.
     """
@@ -184,7 +187,7 @@ def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
 def _shares(cases: list[ShownCase]) -> Figure:
     """Draw the P, I and D terms of the actuator force after the move (thesis, Fig. 13).
 
-    All cases have one scale.
+    All panels have one scale.
     """
     start, end = _window(cases)
     periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
@@ -211,7 +214,7 @@ def _shares(cases: list[ShownCase]) -> Figure:
 
 
 def _joint(cases: list[ShownCase]) -> Figure:
-    """Draw the joint's deflection with its stroke limits, for cases whose joint is free."""
+    """Draw the joint's deflection with its stroke limits, where the joint is free."""
     start, end = _window(cases)
     panels = []
     for item in cases:
@@ -235,7 +238,7 @@ def _joint(cases: list[ShownCase]) -> Figure:
 def _friction(with_trace: list[ShownCase]) -> Figure:
     """Draw friction against velocity and displacement of the cart.
 
-    If a case hunts, only the settled part of the runs is drawn; otherwise the whole runs.
+    If a stage hunts, only the settled part of the runs is drawn; otherwise the whole runs.
     """
     cases = [item for item in with_trace if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
@@ -261,7 +264,7 @@ def _friction(with_trace: list[ShownCase]) -> Figure:
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
-    """Return a panel of lines; a line that hardly moves beside the others becomes a point."""
+    """Return a panel of lines; a line much shorter than the others becomes a point."""
     spans = [_span(line.x) for line in lines]
     rest = [span <= 0.01 * max(spans) for span in spans]
     points = [
@@ -283,7 +286,7 @@ def _window(cases: list[ShownCase]) -> tuple[float, float]:
 
 
 def _deviation(item: ShownCase) -> Array:
-    """Return position minus reference [m] of a case's run."""
+    """Return position minus reference [m] of a run."""
     return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
 
 

@@ -15,7 +15,7 @@ LITTLE = 0.5
 
 
 def isolator_sentence(suggestion: Suggestion) -> str:
-    """Say whether the stage would stop hunting on the suggested isolator; in which time it settles is not said."""
+    """Say whether the stage would stop hunting on the suggested isolator."""
     flat = suggestion.stage.flat()
     joint = (
         f"an isolator of k_j = {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "

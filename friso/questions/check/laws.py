@@ -27,7 +27,7 @@ COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9:
 
 
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
-    """Say case by case whether the verdict depends on the friction law.
+    """Say whether the verdict depends on the friction law, joint as given, locked and free.
 
     Then say which measurement would decide, and name the laws that were not tried.
     """
@@ -48,7 +48,10 @@ def _misses(verdict: LawVerdict) -> str:
 
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
-    """Say for one case what the stage does under each law, and which measurement would decide."""
+    """Say what the stage does under each law, and which measurement would decide.
+
+    `case` is "given", "locked" or "free", by the state of the joint.
+    """
     hunts, edges = laws.hunts(case), _edges(laws, case)
     if hunts is not None:
         verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
@@ -163,7 +166,8 @@ def laws_columns(laws: VerdictsByLaw) -> list[str]:
 def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
     """Return the rows of the table with one column per law.
 
-    Verdict, amplitude and edge come case by case, then what was varied and what is not reproduced.
+    Verdict, amplitude and edge come first, with the joint as given, locked and free. Then follow what was varied, what
+    is not reproduced, and where the law is passive.
     """
     rows = []
     for case, label in case_labels(laws.stage).items():
@@ -179,9 +183,9 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
 
 
 def _verdict(verdict: LawVerdict, case: str) -> str:
-    """Write the verdict on a case by one friction law, or several joined by "or".
+    """Write the verdict by one friction law, or several joined by "or".
 
-    "(not certain)" is added where it applies.
+    `case` is "given", "locked" or "free". "(not certain)" is added where it applies.
     """
     return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
 
@@ -234,7 +238,7 @@ def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
 
 
 def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
-    """Return the verdicts and trials of one law in a case."""
+    """Return the verdicts and trials of one law with the joint as given, locked or free."""
     return {
         "verdicts": list(verdict.verdicts(case)),
         "trials": [_trial(trial, case) for trial in verdict.trials],

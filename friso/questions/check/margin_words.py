@@ -29,8 +29,8 @@ def friction_sentences(case: Case) -> list[str]:
 def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
     """Say at which values of a parameter hunting begins or ends.
 
-    `name` is the parameter in words, and `remark` is added to the sentence. `lowest` names the parameter at the lowest
-    value searched, if that has a name.
+    `name` is the parameter in words, and `remark` is added to the sentence. `lowest` replaces the least multiple
+    searched by a word, such as "no stroke".
     """
     does, starts = ("ends", "ends") if margin.attracts else ("begins", "starts")
     sure = all(end.certain for end in (margin.below, margin.above) if end)
@@ -60,7 +60,7 @@ def margin_ways(margin: ParameterMargin) -> list[str]:
 
 
 def thin_margins(case: Case) -> list[str]:
-    """List small margins of a case that settles: what little change brings hunting back.
+    """List small margins of a stage that settles: what little change brings hunting back.
 
     A margin is small if it is less than the distance from the edge that advice keeps.
     """
@@ -89,9 +89,9 @@ def _way(side: int, end: MarginEnd) -> str:
 
 
 def _gap(case: Case, margin: ParameterMargin) -> str:
-    """Write the gap between static and Coulomb friction [N] at the nearest end.
+    """Write static minus Coulomb friction [N] where hunting begins or ends.
 
-    The text is empty for a stage with several friction laws, or without a single end.
+    The text is empty for a stage with several friction laws, or unless hunting changes on one side only.
     """
     flat = case.stage.flat()
     pairs = static_frictions(flat)

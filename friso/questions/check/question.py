@@ -48,9 +48,9 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
-    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds the fates of stages
-    drawn from uncertain keys, or None; `cut` tells that Ctrl-C left some undrawn. `laws` holds the verdicts across
-    friction laws, or None.
+    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds what machines do that
+    were drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some of them undrawn. `laws` holds the
+    verdicts under all friction laws, or None.
     """
 
     stage: Stage
@@ -60,7 +60,7 @@ class CheckAnswer(Answer):
 
     @property
     def interrupted(self) -> bool:
-        """Tell whether Ctrl-C ended the draws."""
+        """Tell whether Ctrl-C ended the work before all machines were drawn."""
         return self.cut
 
     @cached_property
@@ -85,7 +85,7 @@ class CheckAnswer(Answer):
 
     @property
     def failure(self) -> str:
-        """Say whether the run of a case failed or ran away; empty if all went well."""
+        """Say whether a run failed or ran away, and in which case; empty if all went well."""
         if any(not case.solver.done and not case.runs_away for case in self.result.values()):
             return "the computation could not be completed; see the status above"
         away = any(case.runs_away for case in self.result.values())
@@ -108,7 +108,10 @@ class CheckAnswer(Answer):
         return [*drawn, *answer(self.result), *short, *suggested, *(laws_sentences(self.laws) if self.laws else [])]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """Return the numbers of each case, of the stages drawn, and across friction laws."""
+        """Return the numbers of each case, of the machines drawn, and across friction laws.
+
+        The cases are the stage as given, with its joint locked, and with its joint free.
+        """
         from friso.questions.check.draws import draws_rows
         from friso.questions.check.laws import laws_columns, laws_rows
         from friso.questions.check.table import rows, rows_behind
@@ -125,7 +128,10 @@ class CheckAnswer(Answer):
         return [*tables, behind]
 
     def details(self) -> Sequence[str]:
-        """Say what the search for the edge may miss; add the joint's margins and passivity doubts."""
+        """Return what the search for the edge may miss, joint margins, and a doubt on friction.
+
+        The doubt is that a friction law may give energy back, which no friction does.
+        """
         from friso.questions.check.margin_words import joint_sentences
         from friso.questions.check.words import between_surveyed
         from friso.questions.convert.words import activity_sentences
@@ -143,10 +149,7 @@ class CheckAnswer(Answer):
 
     @cached_property
     def joint_margins(self) -> Mapping[str, ParameterMargin]:
-        """Return the margins in the joint's stroke and stiffness by key.
-
-        They belong to the case with a free joint.
-        """
+        """Return the margins in the joint's stroke and stiffness by key, with the joint free."""
         from friso.hunting import joint_margins
 
         case = self.result.get("free", self.result["given"])
@@ -158,7 +161,7 @@ class CheckAnswer(Answer):
         return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
 
     def figures(self) -> Sequence[Figure]:
-        """Return the figures of the motion and of the hunting cycles of each case."""
+        """Return the figures of motion and hunting cycles, as given and with joint locked and free."""
         from friso.questions.check.figures import check_figures
 
         return check_figures(self.traced)
@@ -229,7 +232,7 @@ def checked_stage(
     laws: bool = False,
     progress: Progress = silent,
 ) -> CheckAnswer:
-    """Answer the question of a stage whose uncertain keys have these correlations.
+    """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
     Raises InputError for a number of draws that is not usable.
     """
@@ -273,7 +276,7 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return a case whose verdict is not certain where only the drive makes the loop unstable."""
+    """Return a check's result, not certain if the drive alone makes the loop unstable."""
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")
@@ -286,9 +289,9 @@ def _as_built(case: Case) -> Case:
 
 
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
-    """Log the verdict on a case as soon as it is certain, while other parts are still computed.
+    """Log the verdict on a stage as soon as it is certain, while other parts are still computed.
 
-    The message is information of the logger "friso".
+    `name` is the case: "given", "locked" or "free". The message is information of the logger "friso".
     """
     from friso.questions.check.words import IN_SHORT
     from friso.shown.cases import case_labels
@@ -300,7 +303,7 @@ def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
 def _drawable(stage: Stage, correlations: Correlations, seed: int) -> Correlations | None:
     """Return the correlations of an uncertain stage if machines can be drawn from it.
 
-    Returns None, with a warning, if nearly every draw is invalid.
+    Returns None, with a warning, if nearly all machines drawn are invalid.
     """
     settings = StudySettings.current()
 

@@ -1,4 +1,7 @@
-"""Write the table of a check: the name of each quantity, and its text for each case."""
+"""Write the table of a check: the name of each quantity, and its text for each case.
+
+The cases are the stage as given, with its joint locked, and with its joint free.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ UNKNOWN = "not determined: that takes more work than a check may"
 
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table; rows in which no case has an entry are left out."""
+    """Return the rows of the table, one text for each case; rows without any entry are left out."""
     return _rows(_NUMBERS, cases)
 
 
@@ -40,16 +43,19 @@ def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
 
 
 def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """Return the rows of some columns; rows in which no case has an entry are left out."""
+    """Return rows with one text for each case, computed by `columns`.
+
+    Rows in which no case has an entry are left out.
+    """
     texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
 def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
-    """Turn a function that describes a cycle into one that describes a case's cycle."""
+    """Return a function that writes `text` about the hunting cycle of a stage, if it has one."""
 
     def of_the_case(case: Case) -> str:
-        """Write the text about the cycle of a case, or that there is none."""
+        """Write the text about the cycle of a stage, or that there is none."""
         cycle = case.judgement.cycle
         return text(cycle) if cycle else NOTHING
 
@@ -74,7 +80,7 @@ def _decided(cycle: Cycle) -> str:
 
 
 def _further_cycles(case: Case) -> str:
-    """List the cycles beside the one that decides the verdict."""
+    """List the cycles of a stage, except the one that decides the verdict."""
     judgement = case.judgement
     return (
         "; ".join(_further_cycle(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle)
@@ -97,7 +103,7 @@ def _observed(case: Case) -> str:
 
 
 def _verdict(case: Case) -> str:
-    """Write the verdict of a case, and whether it is certain."""
+    """Write the verdict on a stage, and whether it is certain."""
     if case.runs_away:
         return f"{case.verdict} (runs away)"
     return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
@@ -173,10 +179,10 @@ def _peaks(case: Case) -> str:
 
 
 def _settled_within(band: float) -> Callable[[Case], str]:
-    """Build the text of the settling time into a band [m]."""
+    """Return a function that writes a stage's settling time into a band [m]."""
 
     def text(case: Case) -> str:
-        """Write the settling time of a case, or why there is none."""
+        """Write the settling time of a stage, or why there is none."""
         time = case.settling_time.get(band)
         if case.tracking:
             return NOTHING
@@ -190,7 +196,10 @@ def _settled_within(band: float) -> Callable[[Case], str]:
 
 
 def _tracked(size: Callable[[Tracking], float]) -> Callable[[Case], str]:
-    """Build the text of an error of a case whose reference keeps moving."""
+    """Return a function that writes how well a stage follows a reference that keeps moving.
+
+    `size` picks the error [m].
+    """
     return lambda case: with_unit(size(case.tracking), "m") if case.tracking else NOTHING
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def trace_of(item: ShownCase) -> xr.Dataset:
-    """Return the time response of a case that has one."""
+    """Return the time response of a stage that has one."""
     assert item.case.trace is not None  # check_figures let no other through
     return item.case.trace
 

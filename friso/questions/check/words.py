@@ -1,4 +1,4 @@
-"""Say in words what a check found: one sentence for each case, and the conclusion."""
+"""Say in words what a check found, for each state of the joint, and the conclusion."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ IN_SHORT: Mapping[Verdict, str] = {
     "transient": "does not hunt",
     "settles": "does not hunt",
 }
-"""Words for the verdict on a case before its margin is known."""
+"""Words for the verdict on a stage before its margin is known."""
 
 ONE_PLACE = 1.01
 """Ratio of the ends of a window of bandwidths below which its centre and width are stated instead."""
@@ -65,7 +65,7 @@ ROUGHER = 10 * ROUGH
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
-    """Say what a case does, and what to do about it.
+    """Say what the stage does in one case, such as with its joint locked, and what to do.
 
     `cases` holds all cases of the check, so that advice on one may use the others.
     """
@@ -95,7 +95,7 @@ def _loop(case: Case) -> list[str]:
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
-    """Return one sentence for each case shown, and the conclusion from all."""
+    """Return a sentence for each case: as given, joint locked, joint free; then the conclusion."""
     says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
     return [*says, *filter(None, [conclusion(cases)])]
 
@@ -103,7 +103,8 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 def conclusion(cases: Mapping[str, Case]) -> str | None:
     """Say what the joint does to the hunting.
 
-    Returns None unless both cases of the joint have a certain verdict.
+    Returns None if the stage hunts neither with its joint locked nor with it free, or if one of the two verdicts is not
+    certain.
     """
     both = [cases[key] for key in ("locked", "free") if key in cases]
     words = [case.verdict for case in both]
@@ -118,7 +119,7 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 
 
 def _reserve(case: Case) -> str:
-    """Say that a case which settles is close to hunting, if it is."""
+    """Say that a stage which settles is close to hunting, if it is."""
     thin = thin_margins(case)
     sure = (case.static_friction is None or case.static_friction.certain) and (
         case.judgement.margin is None or case.judgement.margin.certain
@@ -133,7 +134,7 @@ def at_the_end(case: Case) -> str:
 
 
 def _hunting(case: Case) -> str:
-    """Describe a case that hunts, and say whether the verdict rests on simulations alone."""
+    """Describe a stage that hunts, and say whether the verdict rests on simulations alone."""
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
     seen = "This rests on long simulations: no attracting orbit could be closed."
@@ -146,7 +147,7 @@ def _hunting(case: Case) -> str:
 
 
 def _bistable(case: Case) -> str:
-    """Describe a case that settles after this move but hunts after others.
+    """Describe a stage that settles after this move but hunts after others.
 
     The sentences name the smallest kicks, and the fraction of moves, that start hunting.
     """
@@ -170,7 +171,7 @@ def _bistable(case: Case) -> str:
 
 
 def _following(case: Case) -> str:
-    """Describe a case whose reference keeps moving, of which there is no verdict on hunting."""
+    """Describe a stage whose reference keeps moving; there is no verdict on its hunting."""
     follows = following_sentence(case.tracking) if case.tracking else "could not be followed on its periodic response."
     return f"{follows} There is no verdict on hunting, because {case.judgement.hunting.reason}."
 
@@ -187,7 +188,7 @@ def _kick(name: str, kick: Kick, unit: str) -> str:
 
 
 def _transient(case: Case) -> str:
-    """Describe a case that has no attracting cycle, but has not settled at the end of its run.
+    """Describe a stage without attracting cycle that has not settled at the end of its run.
 
     The sentences say how fast it settles afterwards, or what keeps it from its reference.
     """
@@ -221,7 +222,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say whether the force limit keeps the stage at its place."""
+    """Say how large the force limit is, and that break-away takes more, if it does."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)
@@ -236,7 +237,7 @@ def _forces(*forces: float) -> list[str]:
 
 
 def _settling(case: Case) -> str:
-    """Describe a case that settles, and say why it cannot hunt, if that is certain."""
+    """Describe a stage that settles, and say why it cannot hunt, if that is certain."""
     hunting = case.judgement.hunting
     says = _settling_sentence(case)
     return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
@@ -258,7 +259,7 @@ def _stuck(case: Case) -> str:
 
 
 def _settling_sentence(case: Case) -> str:
-    """Say how fast a case settles, and into which band."""
+    """Say how fast a stage settles, and into which band."""
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     stuck = _stuck(case)
     if fine == 0 and stuck:
@@ -316,7 +317,7 @@ def _or_more(kick: Kick) -> str:
 
 
 def _outlook(case: Case) -> list[str]:
-    """Say at which bandwidths hunting begins, for a case that need not hunt."""
+    """Say at which other bandwidths the stage hunts, or that none was found."""
     judgement = case.judgement
     says: list[str] = []
     if judgement.margin:
@@ -328,7 +329,7 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _unsearched(case: Case) -> list[str]:
-    """Say that the search through the bandwidths was stopped, if it was."""
+    """Say that the search for hunting at other bandwidths was stopped, if it was."""
     if CheckPart.BANDWIDTHS not in case.judgement.given_up:
         return []
     if case.judgement.margin and case.judgement.margin.certain:
@@ -355,15 +356,15 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
 
 
 def _present_bandwidth(case: Case) -> float | None:
-    """Return the bandwidth of the case [Hz]; None if its controller sets none."""
+    """Return the bandwidth of the stage [Hz]; None if its controller sets none."""
     edge = case.judgement.margin
     return edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
-    """Write a bandwidth that is a multiple of the case's own.
+    """Write a bandwidth that is `factor` times that of the stage.
 
-    It is rounded upward, downward or, with None, to the nearest number.
+    It is rounded upward or downward to some digits, or to the nearest number with `up` = None.
     """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
@@ -376,19 +377,19 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key of a bandwidth [Hz] at which the loop does not cross 0 dB; None otherwise."""
+    """Return the key that sets the bandwidth if it is not a crossover; None if it is one."""
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
 def _windows(case: Case) -> list[str]:
-    """Say at which other bandwidths hunting attracts."""
+    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again."""
     places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
 def _window(case: Case, window: BandwidthWindow) -> str:
-    """Write the range of a window of bandwidths."""
+    """Write a range of bandwidths, beyond the edge of hunting, in which the stage hunts again."""
     low, high = window.low, window.high
     if low and high and high.inside < low.inside * ONE_PLACE:
         width = percent(high.inside / low.inside - 1)
@@ -416,7 +417,7 @@ def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
-    """Say what keeps a case from hunting: a faster or slower controller, or a free joint."""
+    """Say what keeps a stage from hunting: a faster or slower controller, or a free joint."""
     judgement = item.case.judgement
     grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
     ways = [_faster(item.case, judgement.margin)] if judgement.margin and not grows else []
@@ -476,15 +477,20 @@ def _with_other_friction(case: Case) -> str:
 
 
 def _distance(case: Case, edge: Margin) -> float:
-    """Return the distance from the edge that advice keeps, as a factor.
+    """Return by which factor the bandwidth advised lies above the edge of hunting.
 
-    The factor is 1 if something attracts again within that distance, over a range wide or close enough to matter.
+    The factor is 1 if hunting returns within that distance, over a range wide or close enough to matter, or beyond the
+    bandwidths searched.
     """
     distance = SEARCH_LIMITS.edge_distance
     to = edge.quiet * distance
 
     def in_the_way(window: BandwidthWindow) -> bool:
-        """Tell whether a window attracts again between the edge and the bandwidth advised."""
+        """Tell whether the stage hunts again between the edge and the bandwidth advised.
+
+        `window` is a range of bandwidths in which it hunts. A narrow range well below the bandwidth advised does not
+        count.
+        """
         low, high = window.low, window.high
         if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
             return False

@@ -50,14 +50,17 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
 
 
 def _needed(comparison: Comparison) -> float | None:
-    """Return the bandwidth [Hz] that the controller needs alone; None if it does not suffice or is not known."""
+    """Return the bandwidth [Hz] at which the controller alone brings enough machines to rest.
+
+    It is None if no bandwidth tried does, or if this was not computed.
+    """
     needed = comparison.needed
     at = None if needed is None else needed.turning(ENOUGH)
     return None if needed is None or at is None else float(needed.bandwidths[at])
 
 
 def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
-    """Return the results of one option, alone and against option a."""
+    """Return the results of one option, alone and compared with option a, the first."""
     pair = comparison.paired(result)
     crossover = bandwidth(result.option.stage.flat())
     return {

@@ -37,7 +37,10 @@ MOST = (5, 95)
 
 
 def compare_figures(comparison: Comparison) -> list[Figure]:
-    """Return one figure of probabilities, settling times and standstill."""
+    """Draw how many machines keep moving, how fast they settle, and how still they stand.
+
+    The one figure has a panel for each, and shows every option of the comparison.
+    """
     within = with_unit(comparison.within, "m")
     caption = (
         f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same in all options; in position "
@@ -79,14 +82,14 @@ def _probabilities(comparison: Comparison) -> Panel:
 
 
 def _other(share: Share) -> Share:
-    """Return the probability of the contrary, with its interval."""
+    """Return the probability that something does not happen, with its interval."""
     return Share(1 - share.probability, 1 - share.high, 1 - share.low)
 
 
 def _bars(
     x: np.ndarray, ends: list[tuple[float, float]], colour: str, factor: float = 1.0, width: float = 1.4
 ) -> Series:
-    """Return upright bars as one line with gaps."""
+    """Return vertical bars at `x`, from low to high `ends` times `factor`: one line with gaps."""
     places = np.repeat(x, 3)
     heights = np.array([value for low, high in ends for value in (factor * low, factor * high, np.nan)])
     return Series(places, heights, "", colour, width=width)

@@ -119,7 +119,7 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
 
 
 def paired_rows(comparison: Comparison) -> list[PairedRow]:
-    """Return one row for each option except a, with its texts under `PAIRED`.
+    """Return one row for each option except a, the first, with its texts under `PAIRED`.
 
     Each machine is compared with itself under option a.
     """
@@ -170,7 +170,7 @@ def _ratio(median: EstimatedValue) -> str:
 
 
 def _margin(result: OptionResult, comparison: Comparison) -> str:
-    """Write the modulus margin of an option, and the least one or the number of unstable machines."""
+    """Write an option's modulus margin, and the least of all machines or how many are unstable."""
     least = f"least {result.loops.margin.min():.2f}"
     if result.unstable:
         least = f"{result.unstable} of {comparison.machines.count} not stable"
@@ -217,7 +217,7 @@ def _turning(comparison: Comparison) -> list[str]:
 
 
 def _share_at(needed: NeededBandwidth, number: int) -> str:
-    """Write the fraction of machines that come to rest at one of the bandwidths."""
+    """Write the fraction of machines that come to rest at bandwidth `number` of those tried."""
     return percent(float(needed.shares[number]), 3)
 
 
@@ -272,7 +272,7 @@ def _number(result: OptionResult, count: int) -> str:
 
 
 def _cost(result: OptionResult, comparison: Comparison) -> str:
-    """Write the force and the modulus margin of an option, compared with option a."""
+    """Write an option's force over that of option a, the first, and its modulus margins."""
     if result is comparison.results[0]:
         return ""
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
@@ -340,7 +340,7 @@ def _failing(comparison: Comparison) -> list[str]:
 
 
 def _in_the_longer_run(result: OptionResult) -> str:
-    """Say how many machines stay in position in the longer run; nothing if there was none."""
+    """Say how many machines stay in position in the longer run; empty if none was made."""
     if not result.later.done.size:
         return ""
     return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"

@@ -20,7 +20,7 @@ DRAWN = 40
 
 
 def convert_figures(conversion: LawConversion) -> list[Figure]:
-    """Return virgin curves and steady friction over speed, before and after the conversion.
+    """Draw virgin curves, and steady friction over speed, before and after the conversion.
 
     Measured points are drawn if the virgin curve comes from a file.
     """

@@ -62,7 +62,7 @@ def _faster(design: Design) -> str:
 
 
 def _parallel(design: Design) -> str:
-    """Write the gains of Eq. 6 as a PID that acts on the error, low-passed with tau_p."""
+    """Write the gains of Eq. 6 (thesis) as a PID on the error with its low-pass time constant."""
     kp, ki, kd, tau = design.controller.gains.parallel.values()
     gains = f"{trimmed(kp, 'N/m')}, {trimmed(ki, 'N/(m*s)')}, {trimmed(kd, 'N*s/m')}"
     return f"{gains}, with a low-pass filter of time constant τ_p = {trimmed(tau, 's')}"
@@ -90,7 +90,7 @@ def _not_lower(design: Design) -> str:
 
 
 def _bounds(bounds: list[CrossoverBound]) -> str:
-    """List bounds of the crossover with their reasons."""
+    """List bounds of the crossover [Hz], each with its reason."""
     return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 

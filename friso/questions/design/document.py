@@ -91,7 +91,7 @@ def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
 
 
 def _corners(corners: Corners, design: Design) -> dict[str, Any]:
-    """Return the edge of hunting over the corners of friction and masses, and the worst corner."""
+    """Return the edge of hunting at the extremes of friction and masses, and the worst of them."""
     units = {key: field.unit for key, field in design.stage.numeric_keys().items()}
     worst = corners.population.of(corners.worst)
     return {
@@ -152,13 +152,13 @@ def _sizes(geometry: Geometry) -> dict[str, Any]:
 
 
 def _front(design: Design) -> list[dict[str, Any]]:
-    """Return every candidate of the Pareto front, with the beam model's results where computed."""
+    """Return all leaf springs on the Pareto front, with the beam model's results where computed."""
     confirmed = {confirmation.candidate: confirmation for confirmation in design.confirmed}
     return [_candidate(candidate, confirmed.get(candidate)) for candidate in design.candidates]
 
 
 def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
-    """Return one candidate by closed forms and, if computed, by the beam model."""
+    """Return one set of leaf springs by closed forms and, if computed, by the beam model."""
     return {
         **_sizes(candidate.geometry),
         "drive_stiffness_n_per_m": candidate.stiffness,

@@ -63,7 +63,7 @@ def design_figures(design: Design | UnfinishedDesign) -> tuple[Figure, ...]:
 
 
 def _front(design: Design) -> Figure:
-    """Draw the first interfering frequency of leaf springs over their drive stiffness."""
+    """Draw the Pareto front: the first frequency that disturbs control, over drive stiffness."""
     choice, task, safety = design.fitted.choice, design.fitted.task, design.spec.safety
     multiple, stiffest = safety.parasitic, task.friction / (safety.breakaway * task.stroke)
     good = [confirmation for confirmation in design.confirmed if not confirmation.failure]
@@ -97,13 +97,16 @@ def _front(design: Design) -> Figure:
 
 
 def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
-    """Return stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or by beams."""
+    """Return stiffness [N/mm] and frequency [Hz] of leaf springs, by closed forms or by beams."""
     stiffness = np.array([candidate.stiffness / 1e3 for candidate in several])
     return stiffness, np.array([candidate.frequency for candidate in several])
 
 
 def _map(design: Design) -> Figure:
-    """Draw over crossover and stroke in which fraction of the corners moves do not come to rest."""
+    """Draw over crossover and stroke in which fraction of corners moves do not come to rest.
+
+    Corners are the extremes of friction and masses.
+    """
     hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
@@ -132,7 +135,7 @@ def _map(design: Design) -> Figure:
 
 
 def _reach(centres: Array) -> tuple[float, float]:
-    """Return the outer edges of cells around logarithmic centres."""
+    """Return the lower and upper end of a logarithmic axis of cells with these `centres`."""
     edges = cell_edges(centres, log=True)
     return float(edges[0]), float(edges[-1])
 

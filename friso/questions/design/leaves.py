@@ -45,7 +45,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
 
 
 def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
-    """Describe each key whose change relaxes a requirement by `text`, and join the descriptions."""
+    """Describe by `text` each key whose change relaxes a requirement, and join the descriptions."""
     return ", ".join(map(text, requirement.keys))
 
 
@@ -121,7 +121,7 @@ def _why(design: Design) -> str:
 
 
 def _confirmed(design: Design) -> str:
-    """Say how many candidates the beam model confirms, and how close the closed forms are."""
+    """Say how many leaf springs the beam model confirms, and how close the closed forms are."""
     tried = design.confirmed
     failed = sum(bool(confirmation.failure) for confirmation in tried)
     confirmed = [confirmation for confirmation in tried if not confirmation.failure]

@@ -98,7 +98,7 @@ def _stroke(design: Design) -> str:
 
 
 def _worst(corners: Corners, design: Design) -> list[str]:
-    """Name the corner that decides, and how many corners have an uncertain edge."""
+    """Name the worst corner of friction and masses, and how many corners have an uncertain edge."""
     sentences = []
     if corners.hunts:
         count = corners.population.count

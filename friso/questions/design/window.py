@@ -26,9 +26,9 @@ def comfortable(design: Design) -> Range:
 
 
 def stiffest(design: Design) -> float:
-    """Return the highest crossover [Hz] that the Pareto front allows.
+    """Return the highest crossover [Hz] that leaf springs on the Pareto front allow.
 
-    It is a fraction of the highest first interfering frequency on the front.
+    It is a fraction of the highest first frequency on the front that disturbs control.
     """
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 

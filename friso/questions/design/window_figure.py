@@ -55,7 +55,7 @@ def window_figure(design: Design) -> Figure:
 
 
 def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str) -> list[Band]:
-    """Return bars of the parts of ranges that are in view."""
+    """Return bars in a row of the figure, for the parts of `ranges` that are in view."""
     clipped = [(max(low, visible[0]), min(high, visible[1])) for low, high in ranges]
     return [
         Band(np.array(ends), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)
@@ -75,7 +75,7 @@ def _named_once(bands: list[Band]) -> tuple[Band, ...]:
 
 
 def _corners(rows: list[tuple[int, Corners]], visible: Range) -> Markers:
-    """Return marks at the edge of hunting of each corner in view."""
+    """Return marks at the edges of hunting in view, one for each corner of friction and masses."""
     edges_of_rows = [
         (row, corners.edges[(corners.edges > visible[0]) & (corners.edges < visible[1])]) for row, corners in rows
     ]

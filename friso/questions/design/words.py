@@ -41,7 +41,7 @@ class DesignStep:
 
 
 def so_far(design: UnfinishedDesign) -> list[str]:
-    """Say what is decided of a design that was not verified, and what is not known of it."""
+    """Say what is decided of a design that was not verified, and what is still open."""
     crossover = design.stage.flat()[CROSSOVER]
     if not design.interrupted:
         wanted = f"An isolator, not tried in moves (--anyway tries it): {isolator(design.fitted, crossover)}."
@@ -80,7 +80,7 @@ def headline(design: Design) -> list[tuple[str, str]]:
 
 
 def across_laws(design: Design) -> str:
-    """Say between which crossovers the edges lie under all friction laws, and which law is worst."""
+    """Say between which crossovers the edges of hunting lie, and under which friction laws."""
     ends = []
     for place, name in enumerate(("without isolator", "with it")):
         edges = {law: corners[place].highest for law, corners in design.by_law.items()}
@@ -91,7 +91,7 @@ def across_laws(design: Design) -> str:
 
 
 def lost_laws(design: Design) -> str:
-    """Name the friction laws that were not tried, and the corners that they do not reproduce."""
+    """Name the friction laws that were not tried, and corners whose friction they cannot match."""
     corners, flat = design.without, design.stage.flat()
     laws = "; ".join(
         f"{law}, not in {len(where)} of {corners.population.count} corners (such as {corner(corners, flat, where[0])})"
@@ -199,7 +199,7 @@ def edge(corners: Corners) -> str:
 
 
 def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
-    """Describe a corner by its friction and masses."""
+    """Describe a corner, one extreme of all uncertain keys, by its friction and masses."""
     keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
@@ -207,7 +207,7 @@ def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
 
 
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
-    """Return static minus Coulomb friction in the corners [N], shape (n,).
+    """Return static minus Coulomb friction [N] in each corner of the uncertain keys, shape (n,).
 
     Returns None for a friction law that does not have both.
     """
@@ -228,7 +228,7 @@ def refusal(failure: NoDesign) -> str:
 
 
 def _why(failure: NoDesign) -> str:
-    """Give the reason of a failure, and the single requirements whose relaxation is enough."""
+    """Say why there is no design, and which single requirement to relax."""
     if not failure.relaxed:
         tail = "no single requirement was found whose relaxation alone is enough: relax several"
         return f"{failure.reason}\n  {tail}"

@@ -75,7 +75,10 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
 
 
 def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
-    """Return the line of a leaf deflected by the stroke, with parallel ends."""
+    """Return the middle line of a leaf that is deflected by the stroke, on paper.
+
+    `height` is that of its clamp, and `side` 1 or -1 the direction. Its ends are parallel.
+    """
     s = np.linspace(0, 1, 33)
     x, z = (
         drawing.x0 + s * drawing.size(drawing.mechanism.length),
@@ -94,7 +97,10 @@ def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str
 
 
 def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float) -> list[str]:
-    """Return the dimensions and notes of the view from the side."""
+    """Return the dimensions and notes of the view from the side.
+
+    `start` and `end` are the leaf ends on paper, and `row` is half the height of all leaves.
+    """
     mechanism, left = drawing.mechanism, drawing.x0 + drawing.spans[0][0]
     below = drawing.z0 - drawing.spans[1][0]
     top = drawing.z0 - row
@@ -193,7 +199,7 @@ def _marks(drawing: PaperDrawing) -> list[str]:
 
 
 def _together(places: dict[str, SheetPoint]) -> dict[SheetPoint, list[str]]:
-    """Group letters by place, so that marks close together share one place."""
+    """Group the letters of marks by where they stand; marks close together share one point."""
     groups: dict[SheetPoint, list[str]] = {}
     for letter, place in places.items():
         near = next((group for group in groups if math.dist(group, place) < 2 * TEXT), place)

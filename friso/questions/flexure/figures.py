@@ -18,7 +18,7 @@ DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 """Dashes by model: closed forms are dashed, so that both models are visible where they agree."""
 
 Smooth = Callable[[Array, Array, Array], Array]
-"""Interpolator: from places, values there, and new places to the values at the new places."""
+"""Function that interpolates: from positions, values there, and other positions, it returns the values at these."""
 
 FINE = 101
 """Number of deflections along a drawn line."""
@@ -68,7 +68,7 @@ def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]
 def _lines(
     flexure: BothModels, of: Callable[[Evaluation], Array], smooth: Smooth
 ) -> tuple[tuple[Series, ...], Markers]:
-    """Return one quantity by each model as smooth lines, and the points of the best model."""
+    """Return a quantity over the deflection as a line for each model, and the best one's points."""
     fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
         Series(
@@ -86,14 +86,14 @@ def _lines(
 
 
 def _odd(x: Array, y: Array, at: Array) -> Array:
-    """Interpolate an odd function y(x) at other places by a cubic spline."""
+    """Interpolate an odd function y(x), sampled at x from 0 upwards, at `at` by a cubic spline."""
     return CubicSpline(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]))(at)
 
 
 def _even_falling(x: Array, y: Array, at: Array) -> Array:
-    """Interpolate a stiffness that is even in x.
+    """Interpolate a stiffness y that is even in x, at `at`.
 
-    Its inverse grows about as the square of x and is therefore interpolated instead.
+    The inverse is interpolated, since it grows about as the square of x.
     """
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 

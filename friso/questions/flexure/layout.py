@@ -47,7 +47,7 @@ def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
 class PaperDrawing:
     """A mechanism on paper at a scale.
 
-    Places are in paper millimetres, with y downwards. `stroke` is in metres [m].
+    Points and lengths are in paper millimetres, with y downwards. `stroke` is in metres [m].
     """
 
     mechanism: Mechanism
@@ -104,7 +104,7 @@ class PaperDrawing:
         return (low - left, high + right), self._upwards(row, 2), self._upwards(across, 1)
 
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
-        """Return the extent of a view along its upward axis.
+        """Return how far a view reaches along its upward axis, below and above its origin [mm].
 
         It holds `half` to both sides, the marked points, and a part of the block.
         """
@@ -119,23 +119,23 @@ class PaperDrawing:
 
     @property
     def x0(self) -> float:
-        """Return the place of x = 0 on paper; the views stand centred between the notes."""
+        """Return x = 0 on paper [mm]; the views stand centred between the notes."""
         left, right = self.spans[0]
         return LEFT + 5 - left + max(0.0, (WIDTH - 10 - LEFT - RIGHT - (right - left)) / 2)
 
     @property
     def z0(self) -> float:
-        """Return the place of z = 0 on paper, in the view from the side."""
+        """Return z = 0 on paper [mm], in the view from the side."""
         return 5 + ABOVE + self.spans[1][1]
 
     @property
     def y0(self) -> float:
-        """Return the place of y = 0 on paper, in the view from above."""
+        """Return y = 0 on paper [mm], in the view from above."""
         return self.z0 - self.spans[1][0] + BELOW + ABOVE + self.spans[2][1]
 
     @property
     def foot(self) -> float:
-        """Return the place on paper where the legend begins."""
+        """Return how far down the sheet the legend begins [mm]."""
         return self.y0 - self.spans[2][0] + BELOW
 
     @property
@@ -144,9 +144,9 @@ class PaperDrawing:
         return self.foot + 23 + FOOT
 
     def side(self, x: float, z: float) -> SheetPoint:
-        """Convert a place [m] to paper coordinates in the view from the side."""
+        """Convert a point [m] to paper coordinates in the view from the side."""
         return self.x0 + self.size(x), self.z0 - self.size(z)
 
     def top(self, x: float, y: float) -> SheetPoint:
-        """Convert a place [m] to paper coordinates in the view from above."""
+        """Convert a point [m] to paper coordinates in the view from above."""
         return self.x0 + self.size(x), self.y0 - self.size(y)

@@ -119,7 +119,10 @@ def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
 
 
 def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
-    """Return the outline of the stage in a plane through its centre."""
+    """Return the outline of the stage, at rest and moved, in the plane of two `axes`.
+
+    The plane goes through the stage's centre of mass.
+    """
     half = np.array(block_size(mechanism)) / 2
     rest = np.tile(_centre(mechanism), (5, 1))
     for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
@@ -163,13 +166,16 @@ def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> li
 
 
 def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
-    """Interpolate places along a leaf [m] and the displacement there by a cubic spline."""
+    """Interpolate a leaf's displacements by a cubic spline, for a smooth line.
+
+    Returns the positions along the leaf [m], and the displacement at each.
+    """
     reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), FINE))
     return fine, CubicSpline(reported, leaf)(fine)
 
 
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    """Return a few cross-sections between cart and stage.
+    """Return a few cross-sections of a leaf between cart and stage, at rest and moved.
 
     Their turn grows evenly up to the turn of the stage.
     """

@@ -56,7 +56,7 @@ def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
 
 
 def path(points: Iterable[SheetPoint], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
-    """Return a line through points, which is filled if it is closed."""
+    """Return a line through points; `closed` joins its ends, and `fill` is its colour inside."""
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in points)
     return f'<path d="M {corners}{" Z" if closed else ""}" fill={quoteattr(fill)} {LINES[kind]}/>'
 
@@ -130,7 +130,7 @@ def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
 
 
 def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]:
-    """Return a vertical dimension at place x from y1 to y2, with extension lines from `edge`.
+    """Return a vertical dimension at x from y1 to y2, with extension lines from `edge`.
 
     Its text is read from the right.
     """
@@ -152,9 +152,9 @@ def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
 
 
 def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[str]:
-    """Return a line with arrows at both ends.
+    """Return a dimension line with arrows at both ends.
 
-    The arrows point inwards from outside if there is no room between the ends.
+    The arrows point inwards from outside if there is no room between the ends. `direction` leads from start to end.
     """
     back = (-direction[0], -direction[1])
     if math.dist(start, end) > 3 * ARROW:

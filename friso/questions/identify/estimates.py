@@ -33,7 +33,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
 
 
 def key_document(estimate: Estimate) -> dict[str, Any]:
-    """Return an estimate of a key of the stage file, with the text that stands there."""
+    """Return an estimate of a key of the stage file, with the text that the file has for it."""
     document = estimate_document(estimate)
     stands = np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
     text = estimate_text(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None

@@ -40,7 +40,10 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
 
 
 def _intervals(identification: Identification) -> list[Figure]:
-    """Draw the half-width of every key's interval, relative to its centre."""
+    """Draw the half-width of every key's interval, relative to its value.
+
+    Without a value, it is relative to the middle of the interval.
+    """
     bounded = [
         estimate
         for estimate in ordered(identification.estimates)

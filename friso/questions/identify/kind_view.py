@@ -29,10 +29,10 @@ TIME = Axis("Time", "s")
 
 @dataclass(frozen=True)
 class PredictionView(Generic[Result]):
-    """The view of another log that a kind of experiment predicts.
+    """How to show another log that the model from a kind of experiment predicts.
 
-    `worst` is the largest of its relative errors, and `sentence` describes them. `numbers` go into the JSON document.
-    Figures are numbered by log.
+    Of the prediction, `worst` returns the largest relative error, and `sentence` describes the errors. `numbers` go
+    into the JSON document. `figures` take the log's number as well, for their names.
     """
 
     worst: Callable[[Result], float]
@@ -43,14 +43,13 @@ class PredictionView(Generic[Result]):
 
 @dataclass(frozen=True)
 class KindView(Generic[Result]):
-    """The view of the results of one kind of experiment.
+    """How to show the results of one kind of experiment.
 
     Terminal and page show the `title`, `facts`, `sentences` and `warnings`. `numbers` go into the JSON document, in SI
-    with the unit in the key or beside it. Names of `figures` begin with the text given.
-
-    `headline` is a sentence at the head of the page, beside the estimates of keys; it may be empty. `longest` tells
-    that the analysis uses only the longest stretch of a log without gaps. `opening` is the last part of the name of the
-    figure that opens the page, or empty.
+    with the unit in the key or beside it. Names of `figures` begin with the name that is passed. `headline` is a
+    sentence at the head of the page, beside the estimates of keys; it may be empty. `longest` is true if only the
+    longest stretch of a log without gaps is analysed. `opening` is the last part of the name of the figure that opens
+    the page, or empty.
     """
 
     title: str
@@ -70,15 +69,15 @@ VIEWS: Registry[KindView[Any]] = Registry("friso.questions.identify.kinds", "VIE
 
 
 def view_of(kind: str) -> KindView[Any]:
-    """Return the view of a kind of experiment.
+    """Return how to show the results of a kind of experiment.
 
-    A kind without a view of its own is shown by its estimates and its logs.
+    A kind that declares nothing is shown by its estimates and its logs.
     """
     return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
 
 
 def _by_estimates(kind: str) -> KindView[Any]:
-    """Return a view of estimates and logs, for a kind that declares no view."""
+    """Return how to show a kind that declares nothing: by its estimates and its logs."""
 
     def facts(result: Any) -> Facts:
         """List the estimates with their intervals."""
@@ -87,7 +86,7 @@ def _by_estimates(kind: str) -> KindView[Any]:
         )
 
     def figures(result: Any, logs: Sequence[Source], name: str) -> list[Figure]:
-        """Draw the signals that the kind needs of each log."""
+        """Draw, for each log, the signals that this kind of experiment needs."""
         records = [log for log in logs if isinstance(log, Log)]
         return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
 

@@ -1,4 +1,7 @@
-"""The figures of moves: traces, residual, friction over velocity, and profiles of the fit."""
+"""The figures of moves: signals, residual force, friction over velocity, and profiles.
+
+A profile shows how much worse the fit becomes as one parameter is varied.
+"""
 
 from __future__ import annotations
 
@@ -121,7 +124,7 @@ def _difference(time: Array, left: Array, unit: str) -> Panel:
 
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
-    """Draw the residual force over place and speed."""
+    """Draw the residual force over position and speed."""
     settings = IdentificationSettings.current()
     moved = motion(
         moves.log["position"][moves.part],
@@ -200,7 +203,7 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
-    """Draw the profile of one parameter."""
+    """Draw how much worse the fit becomes as one parameter is varied."""
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))

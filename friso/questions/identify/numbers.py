@@ -46,15 +46,15 @@ def name_of(key: str) -> str:
 
 
 def within(key: str) -> str:
-    """Write the name of a key inside a sentence; proper names keep their capitals."""
+    """Write the name of a key as inside a sentence; proper names keep their capitals."""
     name = name_of(key)
     return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
 
 def unit_of(unit: str) -> str:
-    """Write a unit in the form that prefixes know: "N s/m" becomes "N*s/m".
+    """Write a unit so that prefixes can be added to it: "N s/m" becomes "N*s/m".
 
-    Ones are left out: "1 s^2/1" becomes "s^2".
+    Factors of 1 are left out: "1 s^2/1" becomes "s^2".
     """
     top, *below = unit.split("/")
     factors = [part for part in top.replace("*", " ").split() if part != "1"]
@@ -110,7 +110,7 @@ def digits(value: float, unit: str) -> str:
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
-    """Return factor and prefixed unit that suit the value.
+    """Return the factor and the prefixed unit in which to write a value.
 
     Without a value, they suit the range that is possible.
     """
@@ -124,7 +124,7 @@ def _scale(estimate: Estimate) -> tuple[float, str]:
 
 
 def _places(estimate: Estimate, factor: float) -> int:
-    """Return the decimal places that the interval allows."""
+    """Return how many decimal places the interval of an estimate leaves certain."""
     half = estimate.half_width * factor
     if not (math.isfinite(half) and half > 0):
         finite = [
@@ -137,7 +137,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 
 def _written(value: float, factor: float, places: int) -> str:
-    """Write a number with a given number of decimal places."""
+    """Write a value times a factor, to so many decimal places, or with an exponent if shorter."""
     if math.isfinite(value) and not -LARGE <= places <= SMALL:
         size = math.floor(math.log10(abs(value * factor))) if value * factor else 0
         return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"

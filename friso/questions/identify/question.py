@@ -71,7 +71,10 @@ class IdentifyAnswer(Answer):
         return "a model does not describe its log" if self.result.failed else ""
 
     def sentences(self) -> Sequence[str]:
-        """Return what was identified, how well other logs are predicted, and notes."""
+        """Return what was identified, how well other logs are predicted, and notes.
+
+        The sentences of a check follow, if the identified stage was checked.
+        """
         from friso.questions.identify.words import sentences
 
         verdicts = [] if self.checked is None else self.checked.sentences()
@@ -250,7 +253,7 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys that a stage file lacks and a stage `made` up around a log supplies.
+    """List the keys of tables that a stage file lacks, which a stage `made` from logs supplies.
 
     Keys that the user sets are left out.
     """
@@ -260,7 +263,7 @@ def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """Say which tables of keys were made up around a log."""
+    """Say which tables the stage file lacks, and that a log or assumed values fill them."""
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))

@@ -1,4 +1,7 @@
-"""Draw a frequency response: Bode plot with fits, noise and distortion, and low-end friction."""
+"""Draw a frequency response: Bode plot with fits, noise and distortion.
+
+Further figures show the response where it departs from the linear model, and friction there.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ def response_figures(bench: Bench, name: str) -> list[Figure]:
 
 
 def _bode(bench: Bench, name: str) -> Figure:
-    """Draw magnitude over phase, a column for each output."""
+    """Draw magnitudes above phases, with a column for each output."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     columns = [_column(bench, response, number == 0) for number, response in enumerate(outputs)]
     panels = tuple(column[row] for row in range(2) for column in columns)
@@ -56,7 +59,7 @@ def _bode(bench: Bench, name: str) -> Figure:
 
 
 def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
-    """Draw magnitude and phase of one output."""
+    """Draw magnitude and phase of one output; `driven` is true for the driven mass."""
     hertz = response.frequency
     inside = hertz[(hertz >= bench.band[0]) & (hertz <= bench.band[1])]
     fine = np.geomspace(inside[0], inside[-1], 400)
@@ -89,7 +92,10 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
 
 
 def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
-    """Return phases of a fit [deg], shifted by whole turns to the measured phases."""
+    """Return phases of a fit [deg], shifted by whole turns to lie near the measured phases.
+
+    The fit is given at frequencies `fine`, the measurement at `hertz`.
+    """
     off = np.interp(fine, hertz, measured) - fitted
     return fitted + 360 * np.round(np.median(off) / 360)
 
@@ -102,7 +108,7 @@ def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
 
 
 def _unit(response: FrequencyResponse, power: str = "") -> str:
-    """Return the unit of a response, its output divided by a power of time."""
+    """Return the unit of a response: output per input, times `power`, such as "/s^2"."""
     return unit_of(f"{response.channels.output_unit}{power}/{response.channels.input_unit}")
 
 

@@ -124,14 +124,14 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate shows no effect: its interval contains 0."""
+    """Tell whether an estimate of bias or of viscous asymmetry may be zero."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show the quantities that are not identified.
 
-    A kind that was `done` is left out; the reasons say what its logs lacked.
+    A kind in `done` is left out: why its logs were not enough is said elsewhere.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:
@@ -151,7 +151,7 @@ def missing(estimates: Sequence[Estimate]) -> str:
 
 
 def prediction_view(prediction: Prediction) -> PredictionView[Any]:
-    """Return the view of a prediction, as declared by the kind of experiment that predicts."""
+    """Return how to show a prediction, as its kind of experiment declares."""
     view = view_of(prediction.kind).prediction
     assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
     return view
@@ -209,10 +209,7 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """Say how much of logs with gaps is used.
-
-    The analysis takes the longest stretch without a gap.
-    """
+    """Return a row on the samples used, if logs have gaps: those of the longest stretch without."""
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
         return ()
@@ -273,7 +270,7 @@ def details(identification: Identification, files: Sequence[LogFile]) -> list[st
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
-    """Align quantity, value and interval in columns; a missing value is replaced by the reason."""
+    """Align quantity, value and interval in columns; how they were determined is left out."""
     table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table]

@@ -1,4 +1,4 @@
-"""The channels of files of logs over time."""
+"""Draw the channels of log files over time."""
 
 from __future__ import annotations
 

@@ -50,9 +50,10 @@ def options_of(
     kind: str | None = None,
     axis: str | None = None,
 ) -> Any:
-    """Return what the user said of channels, from dictionaries or texts.
+    """Return what the user said of channels: roles, units, scales, kind of log and axis.
 
-    `dt` is the sample time, a text or a number [s]. Raises LogError for a text that cannot be read.
+    `map`, `unit` and `scale` are dictionaries or texts KEY=VALUE, and `dt` is the sample time, a text or a number [s].
+    Raises LogError for a text that cannot be read.
     """
     roles, units, scales = (
         [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()

@@ -41,7 +41,7 @@ SAMPLE = "sample"  # dimension of sampled maps, which have no grid
 
 @dataclass(frozen=True)
 class CellAxis:
-    """A swept key with the places of its cells, in ascending order, shape (n,).
+    """The cells along a swept key, in ascending order, shape (n,).
 
     `positions` are values in SI, or 0, 1, 2, ... if the cells are named by `words`. `places` has the index of each cell
     in the runs.
@@ -77,7 +77,7 @@ class CellAxis:
         return f"{low:.4g} to {high:.4g} {unit}".rstrip() + f", {len(self.positions)} values{spacing}"
 
     def position(self, value: object) -> float:
-        """Return the place of a value [SI] or word on the axis.
+        """Return where a value or word lies on the axis: the value [SI], or the number of the word.
 
         Raises ValueError for a word that is not on the axis.
         """
@@ -92,10 +92,10 @@ class CellAxis:
 
 @dataclass(frozen=True)
 class Look:
-    """The colouring of a variable wherever it is shown: quantity, range, scale and categories.
+    """How a variable is coloured wherever it is shown: quantity, range, scale and categories.
 
-    `numbers` and `codes` have the dimensions of the runs. Codes are indices of `categories`, and NaN where a number
-    counts.
+    `numbers` and `codes` have the dimensions of the runs. A code is the index of a category, or NaN for a cell that is
+    coloured by its number.
     """
 
     quantity: str
@@ -160,12 +160,12 @@ def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
 
 
 def _axis_of_words(key: Hashable, words: tuple[str, ...], places: np.ndarray) -> CellAxis:
-    """Return an axis whose cells are named by words."""
+    """Return an axis whose cells are named by words; `places` are their indices in the runs."""
     return CellAxis(str(key), quantity(key), "", False, np.arange(float(len(words))), words, places)
 
 
 def _sampled(runs: xr.Dataset, key: Hashable) -> CellAxis:
-    """Return the axis of a sampled key, with one place for each sample."""
+    """Return the axis of a key that was sampled at random, with one cell for each sample."""
     coordinate = runs[key]
     places = np.arange(coordinate.size)
     if coordinate.dtype.kind in "iuf":
@@ -249,9 +249,9 @@ def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, 
 
 
 def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Category, ...], np.ndarray]:
-    """Return the categories of cells that have no number, and their codes.
+    """Return the categories of cells that have no number, and a code for each cell.
 
-    Codes are NaN where a number counts.
+    A code is the index of a category, or NaN for a cell that has a number.
     """
     shape, dims = runs[metric].shape, runs[metric].dims
     outcome = _texts(runs, "outcome", dims)
@@ -267,7 +267,10 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
 
 
 def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:
-    """Return codes and texts of a variable; one unknown text if the runs do not have it."""
+    """Return the texts of a variable once each, and their indices in the order of `dims`.
+
+    The indices come first. A variable that the runs lack has a single text, None.
+    """
     if name not in runs:
         return np.zeros((), dtype=int), [None]
     return words_of(runs.transpose(*dims), name)

@@ -42,7 +42,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
     """Return everything that the page's script reads, ready for JSON.
 
     Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
-    `drawn` holds the runs of all cells. Raises ValueError as `look` and `axes_of` do.
+    `drawn` holds the runs of all cells. Raises ValueError for runs without axes, or without the metric.
     """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims
@@ -79,7 +79,7 @@ def machine_of(runs: xr.Dataset) -> Stage | None:
 
 
 def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
-    """Return which positions along each axis the page holds, or which samples.
+    """Return the indices of cells that the page holds along each axis, or of samples.
 
     A map that is too large is thinned evenly.
     """
@@ -89,23 +89,23 @@ def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
 
 
 class _Cells:
-    """The picked cells of a map, which can be taken out of arrays of the runs."""
+    """The cells of a map that its page holds, and their values in arrays of the runs."""
 
     def __init__(self, axes: tuple[CellAxis, ...], chosen: tuple[np.ndarray, ...], sampled: bool) -> None:
         self.axes, self.chosen, self.sampled = axes, chosen, sampled
 
     def indices(self) -> list[np.ndarray]:
-        """Return the index of each picked cell along each dimension of the runs."""
+        """Return the indices of the chosen cells along each dimension of the runs."""
         if self.sampled:
             return list(self.chosen)
         return [axis.places[at] for axis, at in zip(self.axes, self.chosen, strict=True)]
 
     def positions(self) -> list[np.ndarray]:
-        """Return the picked places along each axis: one for each cell along it, or for each sample."""
+        """Return the indices of the chosen cells along each axis; for sampled runs, one per sample."""
         return [self.chosen[0]] * len(self.axes) if self.sampled else list(self.chosen)
 
     def take(self, array: xr.DataArray) -> np.ndarray:
-        """Return the values of the picked cells, shape (cells,)."""
+        """Return the values of the chosen cells, shape (cells,)."""
         dims = (SAMPLE,) if self.sampled else tuple(axis.key for axis in self.axes)
         return np.asarray(array.transpose(*dims).values)[np.ix_(*self.indices())].ravel()
 
@@ -136,9 +136,9 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 
 
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an axis with its values, and where the machine with the keys `flat` stands.
+    """Return an axis with its values, and the value there of the machine with the keys `flat`.
 
-    The machine's place is null beyond the ends of the axis.
+    The machine's value is null beyond the ends of the axis.
     """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)
@@ -199,7 +199,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
 
 
 def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
-    """Return a variable of texts: each text once, and their numbers by cell."""
+    """Return a variable of texts: each text once, and for each cell the index of its text."""
     codes, words = words_of(runs, name)
     numbers = cells.take(runs[name].copy(data=codes)).astype("<u4")
     return {"name": name, "label": variable(name), "words": words, "codes": _base64(numbers)}

@@ -66,9 +66,10 @@ def map_panel(
 ) -> Panel:
     """Return the panel of a variable over the two axes of a map, for figures of several maps.
 
-    The first axis points to the right. Arguments are as for `map_figure`. By default, the title is the variable with
-    the values at which a larger map was cut. Raises ValueError for runs without exactly two axes, and as `map_figure`
-    does.
+    The first axis points to the right. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is
+    the evaluation point: SI values or words by key. By default, the title is the variable with the values at which a
+    larger map was cut. Raises ValueError for runs without exactly two axes, a missing metric, or a marker that lacks an
+    axis.
     """
     axes = axes_of(runs)
     if len(axes) != 2 or SAMPLE in runs.dims:
@@ -82,7 +83,10 @@ def map_panel(
 
 
 def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
-    """Return the panel of a map over two axes x and y, the only dimensions of its arrays."""
+    """Return the panel of a map over two axes x and y, the only dimensions of its arrays.
+
+    `marker` is the evaluation point, and `colouring` says how cells are coloured.
+    """
     z, codes = (
         np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
         for array in (colouring.numbers, colouring.codes)
@@ -99,7 +103,7 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 
 
 def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
-    """Return the curve over two axes that separates cells in which hunting attracts."""
+    """Return the curve over two axes that separates cells in which hunting attracts from others."""
     colouring = look(runs, metric)
     codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
     return _edges(x, y, colouring, codes)
@@ -146,7 +150,10 @@ def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tup
 
 
 def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
-    """Return panels over two axes for values of the further ones, and which values are left out."""
+    """Draw a map of three or more axes as panels over two axes, at some values of the others.
+
+    The text says which of these values have no panel.
+    """
     x, y, *further = plane_first(axes)
     picked = pick([len(axis.places) for axis in further], SLICES)
     panels = []
@@ -174,7 +181,10 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
 
 
 def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
-    """Return a variable over a single axis as a line, with patches where it has no number."""
+    """Draw a map with a single axis as a line, with patches where the variable has no number.
+
+    A variable of words becomes rows of points.
+    """
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
     occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
     if not np.isfinite(numbers).any():
@@ -204,7 +214,10 @@ def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> P
 
 
 def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
-    """Return words over a single axis as a row of points for each word."""
+    """Draw a map with a single axis: one row of points for each word, such as "hunts".
+
+    `codes` holds the index of each cell's word, and `occurring` the indices of the words that occur.
+    """
     names = tuple(colouring.categories[i].label for i in occurring)
     markers = tuple(
         Markers(
@@ -222,7 +235,7 @@ def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int])
 def _samples(
     axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
 ) -> tuple[list[Panel], str]:
-    """Return samples over the first two of their keys, and which other keys were sampled."""
+    """Draw samples over the first two of their keys, and name the other keys that were sampled."""
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes

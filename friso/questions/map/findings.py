@@ -86,9 +86,10 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
 
 
 def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a metric has one of some words, and where it has a result.
+    """Return in which cells a metric has one of some words, and which cells have a result.
 
-    A count holds if it is more than 0. Both arrays have the shape of the runs; a large store is read in parts.
+    Without words, cells with a count above 0 are marked. Both arrays have the shape of the runs; a large store is read
+    in parts.
     """
     values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
@@ -103,7 +104,7 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
 
 
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
-    """Mark the positions between the first and the last at which a finding holds.
+    """Mark the range of an axis in which a finding holds, from its first to its last cell.
 
     On an axis of words, only the words at which it holds are marked.
     """
@@ -114,7 +115,7 @@ def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
 
 
 def _range(axis: CellAxis, box: np.ndarray) -> str:
-    """Write the positions of a box along an axis in words."""
+    """Write in words the range of an axis that is marked in `box`."""
     name, inside = in_sentence(axis.key), axis.positions[box]
     if axis.words:
         return f"{name} {listed([axis.words[int(k)] for k in np.unique(inside)], 'or')}"

@@ -38,7 +38,8 @@ PRINTED = ON_PAGE._replace(noted=False)
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
     """Return the figure in all formats and the page of a map, by suffix in the order of `FORMS`.
 
-    `rerun` is as in `map_html`. `draw` makes the runs that the page draws, while the figure is drawn.
+    `rerun` is the command that repeats a run, with {indices} for the indices of its cell. `draw` computes the runs that
+    the page shows, while the figure is drawn.
     """
     figure = marked_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
@@ -53,7 +54,8 @@ def map_html(
 
     `drawn` holds the runs of all cells, of which the page draws the chosen one. `rerun` is the command that repeats a
     run, with {indices} for the indices of its cell: "friso simulate --cell map.zarr {indices}". `figure` is the figure
-    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, and as `map_figure` does.
+    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, or the runs lack axes or the
+    metric.
     """
     if "{indices}" not in rerun:
         raise ValueError(
@@ -84,7 +86,7 @@ def map_html(
 
 
 def marked_figure(runs: xr.Dataset, metric: str) -> Figure:
-    """Return the figure of a map; over two axes, with the place of the swept machine."""
+    """Return the figure of a map; over two axes, with a mark where the swept machine lies."""
     figure, stage = map_figure(runs, metric), machine_of(runs)
     keys = [] if SAMPLE in runs.dims else [axis.key for axis in axes_of(runs)]
     return with_places(figure, [(SHOWN, stage)], keys) if stage and len(keys) == 2 else figure

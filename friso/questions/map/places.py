@@ -1,4 +1,4 @@
-"""Mark where machines stand in a figure over two keys."""
+"""Mark machines in a figure over two keys, at the values that they have."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SHOWN = "this machine"
 
 
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:
-    """Add to a figure over two keys the places of stages that have both keys.
+    """Mark stages that have both keys in a figure over these keys.
 
-    `stands` gives label and stage. Places outside the axes are left out.
+    `stands` gives label and stage. Stages beyond the axes are left out.
     """
     places = []
     for label, stage in stands:
@@ -31,7 +31,7 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
             places.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
 
     def marked(panel: Panel) -> Panel:
-        """Add the places that lie within a panel."""
+        """Add the marks that lie within a panel."""
         inside = [one for one in places if _is_on(panel.x, one.x[0]) and _is_on(panel.y, one.y[0])]
         return replace(panel, markers=(*panel.markers, *inside))
 

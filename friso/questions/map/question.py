@@ -95,7 +95,7 @@ class SweepAnswer(Answer):
         return self.study.cells <= LARGE
 
     def cell(self, *numbers: int | str) -> Stage:
-        """Return the stage of a cell, by its numbers along the axes.
+        """Return the stage of a cell, by the cell's indices along the axes.
 
         Both ``answer.cell(3, 4)`` and ``answer.cell("3 4")`` are understood.
         """
@@ -354,9 +354,9 @@ def _another_study(store: Path) -> InputError:
 
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
-    """Return the relative tolerance that the user chose.
+    """Return the relative tolerance of the solver: the user's, or one that is safe for "auto".
 
-    With "auto", it is chosen on a sample of the cells, and logged.
+    It is then the loosest at which enough outcomes of a sample of cells survive, and is logged.
     """
     settings = StudySettings.current()
     if entry != "auto":
@@ -403,10 +403,10 @@ def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
 def _filled(
     study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
 ) -> tuple[xr.Dataset, bool]:
-    """Run the cells that a store lacks; return the runs and whether the store can take notes.
+    """Run the cells that a store lacks; return the runs, and whether the store can be written.
 
-    If the run ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is read instead, unless figures `beside` it have to be noted in it.
+    If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
+    is only read. With `beside`, it is refused, since the names of figures beside a store are noted in it.
     """
     stored = 0
 

@@ -50,7 +50,7 @@ BYTES = 8
 
 @dataclass(frozen=True)
 class Varied:
-    """The options on which keys are varied and how, as the user gave them."""
+    """What the user asked to vary: axes, links between keys, and how to sample them."""
 
     axes: Mapping[str, AxisValues] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
@@ -175,9 +175,9 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
 
 
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
-    """Return the runs of all cells that were not inferred, for the page to draw.
+    """Simulate the runs of all cells, for the page to draw.
 
-    Returns None for more than DRAWN cells.
+    Cells whose result was inferred from neighbours have none. Returns None for more than DRAWN cells.
     """
     from friso.studies.traces import traces
 
@@ -210,7 +210,7 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
     """Refuse to write over anything but earlier results of this study.
 
-    `beside` is the example of the refusal if figure and page are written beside the store. Raises InputError for
+    If figure and page are written beside the store, `beside` is the example that a refusal shows. Raises InputError for
     foreign files, and StoreError for a store with another study.
     """
     from friso.studies.metadata import is_store
@@ -277,7 +277,7 @@ def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
 
 
 def _noted_digests(store: Path) -> dict[str, list[object]]:
-    """Return the digests that a store notes, by file name; they may be of other files."""
+    """Return the digests that a store has noted, by file name; other files may be among them."""
     from friso.studies.metadata import checked_metadata
 
     try:

@@ -120,7 +120,10 @@ def unit_of(array: xr.DataArray) -> str:
 
 
 def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
-    """Return the texts of a variable as codes of its shape, and each text once by first place."""
+    """Return a variable of texts as codes of its shape, and the texts that they stand for.
+
+    Texts come in the order in which they occur.
+    """
     import pandas as pd
 
     values = runs[name].values

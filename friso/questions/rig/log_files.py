@@ -36,10 +36,7 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """Return the keys of joint and controller that a log set otherwise than the stage file.
-
-    Values are texts with units.
-    """
+    """Return the keys of joint and controller that were changed for a log, as texts with units."""
     before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text
@@ -55,9 +52,10 @@ def stage_text(stage: Stage, seed: int) -> str:
 
 
 def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
-    """Write signals of shape (n,) by role, every `interval` [s], below a line of comment.
+    """Write signals of shape (n,), by role, as CSV below a line of comment, the `heading`.
 
-    Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if the file cannot be written.
+    Samples are `interval` [s] apart. Numbers have twelve digits, which is a nanometre in a kilometre. Raises OSError if
+    the file cannot be written.
     """
     names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
     count = len(next(iter(signals.values())))

@@ -17,9 +17,10 @@ from friso.studies.rig.outcome import Outcome
 
 @dataclass(frozen=True)
 class OutcomeView:
-    """The view of an experiment's outcome.
+    """How to show the outcome of one of the rig's experiments.
 
-    Fields are functions for sentences, for figures arranged as in the thesis, and for numbers of the JSON document.
+    Each field is a function of the outcome: sentences, figures arranged as in the thesis, and numbers of the JSON
+    document.
     """
 
     sentences: Callable[[Outcome], list[str]]
@@ -34,9 +35,10 @@ Every module of `friso/questions/rig/experiments/` declares one, and so does eve
 
 
 def view_of(experiment: str) -> OutcomeView:
-    """Return the view of an experiment, or one that shows only its logs.
+    """Return how to show an experiment's outcome; without a declaration, by its logs alone.
 
-    A view of another package that cannot be used is reported and left out, because the experiment has run by then.
+    A declaration of another package that cannot be used is reported and left out, because the experiment has run by
+    then.
     """
     try:
         if experiment in OUTCOME_VIEWS:

@@ -70,7 +70,7 @@ class SimulateAnswer(Answer):
 
     @cached_property
     def dwells(self) -> Sequence[Dwell]:
-        """Return how the stage settles wherever its reference stands, if at more than two places."""
+        """Return how the stage settles at each standstill of its reference, if it has more than two."""
         from friso.equations.motion import stands
         from friso.hunting import dwells, dwells_of_trace
 
@@ -88,7 +88,7 @@ class SimulateAnswer(Answer):
         return "" if done else "the computation could not be completed; see the status above"
 
     def sentences(self) -> Sequence[str]:
-        """Say what the run does, how it settles at several places, and if its moves are too short."""
+        """Say what the run does, how it settles at each standstill, and if its moves are too short."""
         from friso.equations.motion import ends_evenly, rests
         from friso.questions.simulate.words import built_sentence, conclusion
         from friso.shown.motion_words import dwell_sentences, motion_sentences

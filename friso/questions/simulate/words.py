@@ -21,8 +21,8 @@ def conclusion(
 ) -> str:
     """Say what the run of a stage does.
 
-    `moves_on` tells that the reference moves at the end, and `evenly` that its velocity is then constant. `deviation`
-    has evenly timed samples of the deviation from the reference [m], shape (n,).
+    `moves_on` is true if the reference moves at the end, and `evenly` if its velocity is then constant. `deviation` has
+    evenly timed samples of the deviation from the reference [m], shape (n,).
     """
     before, late = np.split(np.abs(deviation), [int(WINDOW * len(deviation))])
     grows = bool(late.max() > GROWN * before.max(initial=0.0))
@@ -54,6 +54,7 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
     """Describe a run that is off its reference at the end but does not swing.
 
     In its last quarter it `moved` [m] and was off by at most `farthest` [m]. At the end it is off by `final` [m].
+    `grows` is true if it is ever farther off.
     """
     if grows:
         return (

@@ -49,7 +49,7 @@ RTOL = 1e-7
 
 
 def tune_figures(tuning: Advice) -> list[Figure]:
-    """Return one figure of the response, the settling times, the sensitivities and the windows."""
+    """Return one figure of the response, settling times, sensitivities, and settings that work."""
     lines = drawn_stages(tuning)
     panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))
     caption = (
@@ -63,7 +63,7 @@ def tune_figures(tuning: Advice) -> list[Figure]:
 
 
 class RemedyLine(NamedTuple):
-    """Label, colour and dashes of the lines of one stage."""
+    """How the lines of one stage look: label, colour and dashes."""
 
     label: str
     colour: str
@@ -77,8 +77,8 @@ Lines = Sequence[ShownRemedy]
 def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
     """Return the stages that are drawn, with their lines.
 
-    The stages are: the stage as it is, and the least change and the fastest remedy, both with the controller alone and
-    with a joint. If none works, unsure remedies are drawn.
+    First comes the stage as it is. The least change and the fastest remedy follow, without and with a bought joint. If
+    none works, unsure remedies are drawn.
     """
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in _shown(tuning):
@@ -156,9 +156,9 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
 
 
 def _windows(tuning: Advice) -> list[Panel]:
-    """Return the panel of the windows of the least change's numbers.
+    """Draw in which range each number of the least change still works, the others as tuned.
 
-    Windows are given as factors of the tuned numbers.
+    Ranges are given as factors of the tuned numbers.
     """
     least = tuning.least
     if least is None or not least.windows:
@@ -176,7 +176,7 @@ def _windows(tuning: Advice) -> list[Panel]:
 
 
 def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
-    """Return the panel of the largest sensitivity of the limit cases.
+    """Draw each stage's sensitivity over frequency, the largest of all limit cases.
 
     The loops include the drive as built, up to half its sampling rate, just as the margins do.
     """

@@ -60,7 +60,10 @@ def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Con
 
 
 class Behind(NamedTuple):
-    """A foldable part of the page: title, sentences and facts; `open` if unfolded at first."""
+    """A part of the page that can be folded: title, sentences and facts.
+
+    `open` is true if it is unfolded at first.
+    """
 
     title: str
     sentences: Sequence[str]

@@ -67,7 +67,7 @@ class TuneAnswer(Answer):
         return self.result.interrupted
 
     def details(self) -> Sequence[str]:
-        """Return gains for drives, windows of the numbers, what matters most, and assumptions."""
+        """Return gains for drives, where the numbers may lie, what matters most, and assumptions."""
         from friso.questions.tune.gain_words import gain_lines
         from friso.questions.tune.sensitivity_words import sensitivity_sentences
         from friso.questions.tune.words import assumptions, window_lines
@@ -162,7 +162,7 @@ def tune(
 
 
 def _mention(stage: Stage, goal: Goal, outcome: RemedyOutcome) -> None:
-    """Log the first answer if it works, while the search for a better one goes on."""
+    """Log the first remedy tried if it works, while others are still tried."""
     from friso.questions.tune.words import changes, slowest_time
     from friso.shown.drawing.prefixes import listed
 

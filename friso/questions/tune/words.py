@@ -145,7 +145,7 @@ def answer(tuning: Advice) -> list[str]:
 
 
 def _in_short(tuning: Advice) -> Iterator[str]:
-    """Yield the least change and the fastest remedy, each with its time; nothing if equal."""
+    """Yield one line on the least change and the fastest remedy with their times, unless equal."""
     least, fastest = tuning.least, tuning.fastest
     if least is None or fastest is None or least is fastest:
         return
@@ -175,7 +175,7 @@ def _least_words(tuning: Advice) -> str:
 
 
 def _of_the_drive(tuning: Advice) -> str:
-    """Say that the table [drive] affects the margin alone, if the file has one."""
+    """Say that timing in the table [drive] affects the margin alone, if the file has any."""
     has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
     return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
 
@@ -293,7 +293,7 @@ def _verified(made: RemedyOutcome, tuning: Advice) -> str:
 
 
 def size_words(size: ChangeSize) -> str:
-    """Write how large a change is: parts bought, keys changed, and by which factor."""
+    """Write how large a change is: a joint, the number of keys changed, and their mean factor."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
     some = "" if size.scaled == size.keys else f"{'one' if size.scaled == 1 else size.scaled} of them "
     average = f"{' each' * (not some)} on average" if size.scaled > 1 else ""
@@ -331,7 +331,7 @@ def _holds(measured: Performance, goal: Goal) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """Say what a remedy costs against the stage as it is: force, margin and stiffness."""
+    """Say what a remedy costs beside the stage as it is: force, margin and stiffness."""
     goal, before = tuning.goal, tuning.present
     force = _against(measured.force(goal), before.force(goal), "force", "N")
     resists = "stiffness against a load before the integral acts"
@@ -384,7 +384,7 @@ def _nothing(tuning: Advice) -> list[str]:
 
 
 def length_from(outcome: RemedyOutcome) -> str:
-    """Write the smallest move for which a remedy was verified that serves large moves alone."""
+    """Write the smallest move [m] that a remedy serves, if it serves large moves only."""
     return with_unit(outcome.moves_from or 0.0, "m")
 
 
@@ -479,9 +479,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield the first constraint that leaves no setting.
+    """Yield first the part of the goal that no setting of a remedy meets.
 
-    Only settings that meet the constraints before it count.
+    Only settings that meet the parts before count. If some meet all parts, it says that none surely does on fresh
+    machines, or that it is not known whether they hunt.
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
@@ -515,7 +516,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """Write the lowest bandwidth of the settings that meet all else."""
+    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone."""
     others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
     lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
     return (
@@ -567,7 +568,7 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 
 def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
-    """Return the texts of one row under `COLUMNS`."""
+    """Return the texts of one row of the table: how machines perform, under `COLUMNS`."""
     goal = tuning.goal
     return [
         works,
@@ -604,7 +605,7 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """Say where each number of the least change may lie."""
+    """Say in which range each number of the least change works, the others as tuned."""
     least = tuning.least
     if least is None or not least.remedy.variables:
         return []
@@ -620,7 +621,7 @@ def window_lines(tuning: Advice) -> list[str]:
 
 
 def window_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Return the windows of every remedy that works."""
+    """Return the ranges in which the numbers of every working remedy work."""
     return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
 
 
@@ -630,7 +631,10 @@ def _windows(outcome: RemedyOutcome) -> list[str]:
 
 
 def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
-    """Yield what was not tried because the friction laws declare too little friction."""
+    """Yield what was not tried because friction is too small; nothing without friction.
+
+    Settings against friction need a break-away force, and an isolator needs friction that holds the cart.
+    """
     if leading_friction(flat)["friction.model"] == "none":
         return
     if breakaway(flat) <= 0:

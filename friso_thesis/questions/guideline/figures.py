@@ -1,6 +1,7 @@
 """Draw the charts of the guideline.
 
-They show the edge collapsed onto the rates that determine it, laws against computed edges, and the rig.
+They show the edge of hunting over the frequencies that determine it (rates), edges by the laws against computed ones,
+and the rig.
 """
 
 from __future__ import annotations
@@ -62,7 +63,10 @@ def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
 
 
 def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
-    """Draw the edge of rigid masses over the ratio of their two rates."""
+    """Draw the edge of rigid masses over the ratio of the two frequencies that determine it.
+
+    The bearing slips at one of them; at the other, falling friction drives the mass away.
+    """
     sweep = guideline.locked.test.usable
     slip, drop = np.exp(guideline.locked.law.log_rates(sweep.values))
     mean = np.sqrt(slip * drop)
@@ -83,9 +87,9 @@ def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
 
 
 def _free(guideline: Guideline) -> Figure:
-    """Draw the edge with a free joint of ample stroke over the rate of the joint.
+    """Draw the edge with a free joint of ample stroke over the joint's frequency.
 
-    Both are relative to the locked edge.
+    Both are relative to the edge with the joint locked.
     """
     sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
@@ -106,7 +110,7 @@ def _free(guideline: Guideline) -> Figure:
 
 
 def _stroke(guideline: Guideline) -> Figure:
-    """Draw the fraction of a joint's effect that its stroke leaves."""
+    """Draw which fraction of a joint's effect on the edge remains with a short stroke."""
     sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
     joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2
@@ -130,7 +134,7 @@ def _stroke(guideline: Guideline) -> Figure:
 
 
 def _against(guideline: Guideline) -> Figure:
-    """Draw edges by the laws over computed ones, for samples of the fit and held-out samples."""
+    """Draw edges of hunting by the laws over computed ones, for fitted and held-out samples."""
     locked, free = guideline.locked, guideline.free
     predicted = [
         free.law.edge(sweep.values, locked.law.edge(sweep.values)) for sweep in (free.fit.usable, free.test.usable)
@@ -200,7 +204,7 @@ def _studied(title: str, x: Axis, cases: Sequence[ThesisCase], laws: Laws) -> Pa
 
 
 def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
-    """Return samples coloured by the kind of their edge."""
+    """Return points, one for each sample, coloured by how the hunting cycle ends at its edge."""
     words = list(ENDS)
     codes = np.array([float(words.index(kind)) for kind in sweep.edges.kind.astype(str)])
     present = tuple(ENDS.values())
@@ -208,7 +212,10 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 
 def _both(fit: Fit, which: object) -> Sweep:
-    """Return the samples of fit and test with an edge and groups selected by `which`."""
+    """Return the samples that have an edge, fitted and held-out, for which `which` is true.
+
+    `which` takes the samples' groups.
+    """
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 
 

@@ -128,8 +128,8 @@ def _one_window(sweep: Sweep) -> np.ndarray:
 def _worst(guideline: Guideline) -> dict[str, Any] | None:
     """Summarise the samples whose locked edge is far from the law, fitted and held out.
 
-    Returns how many there are, the ends of their gap and stribeck groups, and how many of each kind; None if there are
-    none.
+    Returns how many there are, the least and largest of their groups gap and stribeck, and how many of each kind.
+    Returns None if there are none.
     """
     used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
@@ -147,7 +147,7 @@ def _between(low: float, high: float) -> str:
 
 
 def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
-    """Return one row for each group.
+    """Return one row for each dimensionless group.
 
     A row has the group's formula, its meaning, its range in the sweeps, and its value for the thesis's rig.
     """

@@ -51,7 +51,7 @@ def _rates(law: FittedLaw) -> list[str]:
 
 
 def _power(group: str, exponent: float) -> str:
-    """Return a group over its reference to a power."""
+    """Write a group, divided by its reference, to a power."""
     written, reference = GROUPS[group].written, REFERENCE[group]
     base = f"({written})" if reference == 1 else f"({written}/{reference:g})"
     if group == "gap":
@@ -91,9 +91,10 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 
 
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
-    """Say where the ranges of crossovers end, by the damping ratio of the mode.
+    """Say which crossovers leave enough margin beside parasitic modes, joint locked, then free.
 
-    The joint is locked, then free. Also say whether one multiple of the crossover is a rule for all modes.
+    There is one sentence for each damping ratio of the mode. The last says whether one multiple of the crossover is a
+    rule for all modes.
     """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."
@@ -110,7 +111,10 @@ def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
 
 
 def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str:
-    """Return the edges of one state of the joint and one damping ratio."""
+    """Say between which crossovers the margin is enough, over all modes with one damping ratio.
+
+    `state` is "locked" or "free", the state of the joint.
+    """
     ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
     usable = {frequency: end for frequency, end in ends.items() if end}
     without = [f"{frequency:g}" for frequency, end in ends.items() if not end]

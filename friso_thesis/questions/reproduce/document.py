@@ -119,7 +119,7 @@ def _part(part: Part) -> dict[str, Any]:
 
 
 def _space(space: ClaimInSpace) -> dict[str, Any]:
-    """Return the result on a claim over the joint draws."""
+    """Return in how many draws of the open values a claim holds, and on which values it depends."""
     return {
         "draws": space.draws,
         "undecided": space.undecided,

@@ -138,7 +138,10 @@ def _response(reproduction: Reproduction) -> Figure:
 
 
 def _shares(reproduction: Reproduction) -> Figure:
-    """Draw the P, I and D terms of the force on the locked rig, wide gap above narrow gap."""
+    """Draw the P, I and D terms of the locked rig's force, at a wide and a narrow friction gap.
+
+    The gap is static minus Coulomb friction.
+    """
     panels = []
     for name in (WIDE, NARROW):
         trace = reproduction.responses[name].trace

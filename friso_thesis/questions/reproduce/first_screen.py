@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 class Remark:
     """A remark on a claim.
 
-    It has the text, the number of the criterion (from 0) that supports it, whether that criterion must be met for the
-    remark to apply, and the command that shows more.
+    It has the text, and the number of the criterion (from 0) that supports it. `met` tells whether that criterion must
+    be met, or not met, for the remark to apply. The command shows more.
     """
 
     claim: str
@@ -106,5 +106,5 @@ def as_far(verdict: ClaimVerdict) -> str:
 
 
 def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
-    """Return the claims of the thesis's own list that hold."""
+    """Return the claims that hold, of those that the thesis itself lists."""
     return [verdict for verdict in verdicts if verdict.judgement == "holds" and verdict.claim.listed]

@@ -14,7 +14,10 @@ TITLE = "Conclusions of the thesis under each friction law"
 
 
 def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
-    """Say how many conclusions survive, which do not, and which laws keep too little to say."""
+    """Say how many conclusions survive other friction laws, and which do not.
+
+    Laws that match too little of the measured friction to say are named.
+    """
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
     others = ", ".join(laws.laws[1:])
     alike = f"{count - len(of_one)} of {count} conclusions have the same judgement"

@@ -148,7 +148,7 @@ def claims_markdown(reproduction: Reproduction) -> str:
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:
-    """Return the items in the order of the verdicts.
+    """Return figures, tables and sections of the thesis with their claims, in its order.
 
     Each figure stands with its first claim, and figures without a claim at the end. A panel's claims, such as those of
     "11A", stand with their figure. Claims that are not covered stand only in the table.
@@ -170,10 +170,7 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) ->
 
 
 def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
-    """Return the title of an item without a figure.
-
-    It says where the thesis makes its claims, and what they are about.
-    """
+    """Name the place in the thesis where an item's claims stand, such as Figure 12 or Sec. 3.2."""
     if place.isdigit():
         return f"Figure {place}"
     return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))

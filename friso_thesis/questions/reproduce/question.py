@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 class ReproduceAnswer(Answer):
     """The thesis recomputed.
 
-    `result` is a `Reproduction` with maps, responses and a verdict on each claim. `laws`, if requested, tells how the
-    conclusions are judged under each friction law.
+    `result` is a `Reproduction` with maps, responses and a verdict on each claim. `laws` are judgements of the
+    conclusions under each friction law, or None.
     """
 
     laws: ConclusionsByLaw | None
@@ -36,7 +36,7 @@ class ReproduceAnswer(Answer):
         return reproduce_document(self.result, self.laws)
 
     def sentences(self) -> Sequence[str]:
-        """Say how many claims hold, which draw fits best, and how many survive other friction laws."""
+        """Say how many claims hold, which open values fit best, and what survives other laws."""
         from friso_thesis.questions.reproduce.laws import laws_sentences
         from friso_thesis.questions.reproduce.words import fit_sentence
 
@@ -85,7 +85,7 @@ class ReproduceAnswer(Answer):
 
 
 def _drawn(space: dict[str, Any] | None) -> str:
-    """Say in how many joint draws a claim holds; "" without draws."""
+    """Say for how many random choices of the open values a claim holds; "" without any."""
     return f"[{space['holds']} of {space['draws']} draws] " if space else ""
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    It has the place where it is `asked`, the `command` that answers it, the meaning of the result, and its `answer` for
+    `asked` names the section that asks, and `command` answers. A text says what the result means. `answer` is that for
     the thesis's rig, from stored findings.
     """
 

@@ -57,7 +57,10 @@ def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Fig
 
 
 def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
-    """Draw the plant with locked joint, place by place, relative to its mass line."""
+    """Draw the plant with the joint locked, at several friction levels, with two mass lines.
+
+    The mass lines are those of the mass weighed, and of the one that the thesis reads off.
+    """
     hertz = np.array(FREQUENCIES)
     omega = 2 * np.pi * hertz
     line = experiments.locked_line
@@ -144,7 +147,7 @@ def _steps(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _slow(experiments: Experiments) -> dict[str, Figure]:
-    """Draw a slow motion over time: position, velocity and force."""
+    """Draw a slow motion over time: position, deflection of the joint, and velocity of the cart."""
     run = experiments.slow_motion[len(experiments.slow_motion) // 2]
     log = run.log
     cart = log["cart_position"]

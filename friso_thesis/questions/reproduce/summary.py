@@ -32,8 +32,8 @@ def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Map
 def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str]) -> Figure:
     """Draw every claim with its whole text on one sheet.
 
-    A row has the word of agreement, the criteria met, and the draws in which the claim holds. Rows are as high as their
-    texts need.
+    A row has the word of agreement and the criteria met. It also says in how many random choices of open values the
+    claim holds. Rows are as high as their texts need.
     """
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.figure import Figure

@@ -60,7 +60,7 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say in how many draws a claim holds, with the interval of the fraction."""
+    """Say for how many random choices of the open values a claim holds, with an interval."""
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -69,7 +69,7 @@ def share(verdict: ClaimVerdict) -> str:
 
 
 def in_draws(verdict: ClaimVerdict, part: int) -> str:
-    """Say in how many draws one of several criteria is met.
+    """Say for how many random choices of the open values one of several criteria is met.
 
     The text is empty for a claim with one criterion, whose fraction is stated with the claim.
     """
@@ -80,7 +80,7 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return the word of agreement by what attracts the stages; "" if that does not matter."""
+    """Return the word of agreement if attractors judge the claim; "" if that does not matter."""
     return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
 
 
@@ -116,10 +116,10 @@ def _first_sentence(text: str) -> str:
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """Return the texts below an item, by name.
+    """Return the texts below a figure or section, by name.
 
-    They are numbers and reasons that are shortened above, draws that decide nothing, and what another grid or tolerance
-    changes.
+    They are numbers and reasons that are shortened above, numbers by what attracts, draws that decide nothing, and what
+    another grid or tolerance changes.
     """
     parts = verdict.finding.stated if verdict.finding else ()
     rows = [
@@ -151,7 +151,7 @@ def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
 def open_rows() -> list[Sequence[str]]:
     """Return the values that the thesis leaves open.
 
-    Each row has the range, the distribution of draws, friso's own choice, and the reason.
+    Each row has the range, how values are drawn from it, friso's own choice, and the reason.
     """
     drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
     return [
@@ -167,9 +167,9 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Say which draw, or friso's own choice, fits the printed numbers best.
+    """Say which random choice of the open values fits the numbers printed in the thesis best.
 
-    Also say which numbers these are.
+    friso's own choice counts too. The sentence also says which numbers these are.
     """
     fit = plausible.fit
     if fit is None:
@@ -191,7 +191,7 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """Return rows of the printed numbers beside the numbers of the best draw."""
+    """Return rows of numbers printed in the thesis, beside those of the best open values."""
     if plausible.fit is None:
         return []
     return [

@@ -41,7 +41,7 @@ def _source(result: InPosition, source: str) -> str:
 
 
 def _damping(result: InPosition) -> str:
-    """Say how much of the difference more damping in the joint recovers."""
+    """Say how much of the difference between free and locked more damping in the joint recovers."""
     recovered = result.recovered
     best = int(np.argmax(recovered))
     factor = result.damping / result.own_damping

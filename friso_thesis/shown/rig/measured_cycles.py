@@ -50,7 +50,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _field(result: CycleComparison) -> str:
-    """Say how many rails with a random field give cycles as slow as the measured ones."""
+    """Say how many rails with random friction give cycles as slow as the measured ones."""
     as_slow, done = result.as_measured(result.field), int((~result.field.failed).sum())
     swings = int(result.field.swings.sum())
     slowest = np.nanmax(result.slower(result.field)) if swings else np.nan
@@ -62,7 +62,7 @@ def _field(result: CycleComparison) -> str:
 
 
 def _asymmetry(result: CycleComparison) -> str:
-    """Say what ends hunting on rails that vary."""
+    """Say how a difference in friction between both sides of the target slows and ends cycles."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], result.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
     parts = [
@@ -91,7 +91,7 @@ def _rolling(result: CycleComparison) -> str:
 
 
 def _irregular(result: CycleComparison) -> str:
-    """Say how the cycles on varied rails are irregular."""
+    """Say whether cycles on varied rails are lopsided, and whether they repeat."""
     swings = result.field.swings & np.isfinite(result.field.rising)
     if not swings.any():
         return "No cycle on a varied rail lasts long enough to show how regular it is."
@@ -143,7 +143,7 @@ def _other_changes(result: CycleComparison) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw Fig. 27, the maps of rails, cycles over asymmetry, and the friction levels."""
+    """Draw Fig. 27, maps over kinds of rails, cycles on lopsided rails, and friction levels."""
     result: CycleComparison = outcome.result
     if not result.even.swings[0]:
         return [_cycles(result)]
@@ -170,7 +170,7 @@ def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _maps(result: CycleComparison) -> Figure:
-    """Draw maps over the correlation length and the deviation of friction."""
+    """Draw maps over the correlation length and the deviation of friction along the rail."""
     lengths, deviations = (
         [with_unit(length, "m") for length in result.lengths],
         [percent(length) for length in result.deviations],
@@ -200,7 +200,10 @@ def _medians(values: np.ndarray) -> np.ndarray:
 
 
 def _by_asymmetry(result: CycleComparison) -> Figure:
-    """Draw the slowness of cycles over the asymmetry of friction about the target."""
+    """Draw how often and how slowly cycles swing, over the asymmetry of friction.
+
+    It is the difference of static friction, in the logarithm, between both sides of the target.
+    """
     size, slow = np.abs(result.asymmetry).ravel(), result.slower(result.field).ravel()
     alive = np.isfinite(slow)
     largest = float(size.max())

@@ -35,10 +35,10 @@ APART = 20.0
 
 @dataclass(frozen=True)
 class SimulationCheck:
-    """Check of the law by simulation.
+    """How many `samples` still swing at the end of long simulations, below and above their edge.
 
-    The fields count how many of the `samples` still swing at the end, started from some distances and after some moves,
-    at 0.9 and at 1.15 times their edge. There are `runs` in all, of which `failed` were not completed.
+    The `stuck` ones began stuck at some distances, the `moved` ones with some moves; `below` is 0.9 and `above` 1.15
+    times the edge of hunting. `runs` were made in all, of which `failed` were not completed.
     """
 
     samples: int
@@ -51,7 +51,7 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """Simulate the first samples that have an edge, at most `most`.
+    """Simulate samples that have an edge of hunting, below and above it; at most `most` of them.
 
     The samples are in random order.
     """
@@ -67,9 +67,9 @@ _Begins = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
 def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs of each sample still swing at the end, and which were completed.
+    """Simulate samples with their crossover at `share` times their edge, `tried` times each.
 
-    Both have the shape (samples, tried).
+    Returns which runs still swing at the end, and which were completed, both of shape (samples, tried).
     """
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)

@@ -41,8 +41,8 @@ SAME = 0.02
 class GuidelineClaim:
     """A claim of the thesis about the edge of hunting.
 
-    It has the claim's words and place, the finding, and whether the claim `holds` by the rule given. This is None if
-    the edge is unknown; the finding then gives the reason.
+    It has the claim's place and words, the `result` found, and the `rule` by which it is judged. The `judgement` says
+    in words that it holds, holds in part or differs, or that an edge is unknown.
     """
 
     where: str
@@ -160,7 +160,7 @@ def _edges(worked: Worked) -> GuidelineClaim:
 
 
 def _verdict(holds: bool, *edges: float) -> bool | None:
-    """Tell whether something holds of edges; None if one of the edges is unknown."""
+    """Return whether a statement about `edges` holds; None if one of the edges is unknown."""
     return None if np.isnan(edges).any() else bool(holds)
 
 

@@ -63,7 +63,7 @@ RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
 class Fit:
     """A law, the samples behind it, and its errors.
 
-    The law has samples that it was fitted to and samples that it was tested on, with errors on both. With a free joint,
+    The law was fitted to the samples `fit` and tested on the samples `test`, with errors on both. With a free joint,
     the locked edge is computed for `on_fit`, and comes from the locked law for `on_test`. `on_computed_edge` has the
     errors of the test with the computed locked edge. `checked` holds simulations of test samples.
     """
@@ -91,7 +91,7 @@ class Fit:
 
     @property
     def again(self) -> int:
-        """Return the number of samples that hunt again above a crossover without attractor."""
+        """Return the number of samples that hunt in two or more separate ranges of the crossover."""
         return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
@@ -126,15 +126,16 @@ class Guideline:
         return Errors.between(law, subset.edge) if len(law) else None
 
     def held_out_by_rates(self) -> list[ByRates]:
-        """Return the errors of the locked law by the ratio of its two rates."""
+        """Return the errors of the locked law, one for each range of the ratio of its two rates."""
         return by_rates(self.locked)
 
 
 @dataclass(frozen=True)
 class ByRates:
-    """Errors of the locked law on held-out samples within a range of slip rate over drop rate.
+    """Errors of the locked law on held-out samples whose ratio of rates lies in a range.
 
-    The ratio is at least `low` and below `high`. The errors are None without samples.
+    The ratio is the frequency at which the bearing slips over that at which falling friction drives the mass away. It
+    is at least `low` and below `high`. The errors are None without samples.
     """
 
     low: float
@@ -143,7 +144,7 @@ class ByRates:
 
 
 def by_rates(locked: Fit) -> list[ByRates]:
-    """Return the errors of the locked law by the ratio of its two rates."""
+    """Return the errors of the locked law, one for each range of the ratio of its two rates."""
     held = locked.test.usable
     ratio = _ratio(locked.law, held.values)
     decades = []
@@ -155,9 +156,10 @@ def by_rates(locked: Fit) -> list[ByRates]:
 
 
 def safe_over_friction(locked: Fit) -> float:
-    """Return the safe factor on the locked law for the rig: the largest over its friction range.
+    """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    Each bin of slip rate over drop rate has its own factor; bins that the rig does not visit do not count.
+    Each range of the ratio of the law's two rates has its own factor. It is the largest of the ranges in which the rig
+    may lie.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]

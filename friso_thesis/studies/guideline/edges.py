@@ -61,7 +61,7 @@ class Edges:
     - `kind`: one of `KINDS`.
     - `inside`: multiplier just below the edge, where a cycle attracts (NaN: only a simulation shows it).
     - `outside`: multiplier just above (NaN: no known cycle).
-    - `windows`: number of windows of the grid with an attractor; the edge belongs to the highest.
+    - `windows`: number of separate ranges of the grid with an attractor; the edge ends the highest.
     """
 
     crossover: np.ndarray
@@ -83,10 +83,12 @@ def concatenate_edges(parts: list[Edges]) -> Edges:
 
 @dataclass(frozen=True)
 class _AtCrossovers:
-    """Results at crossovers.
+    """What was found at some crossovers of some stages, as arrays of one shape.
 
-    They tell whether something attracts, and give the multiplier (NaN: no cycle). They also tell whether a cycle may
-    exist that could not be closed, and whether a simulation that had to decide then failed.
+    - `attracts`: something attracts.
+    - `multiplier`: that of the cycle (NaN: no cycle).
+    - `uncertain`: a cycle may exist that could not be closed.
+    - `failed`: a simulation failed that was to show whether the stage keeps hunting.
     """
 
     attracts: np.ndarray
@@ -140,7 +142,9 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
 
 
 class _Search:
-    """Steps in crossover that contain an edge and are being halved; arrays of shape (stages,).
+    """Search of edges: for each stage a step in crossover that contains its edge and is halved.
+
+    Arrays have the shape (stages,).
 
     - `low`: logarithm of a crossover at which a cycle attracts; `inside`: its multiplier.
     - `high`: logarithm of a crossover at which no cycle is known to attract; `outside`: multiplier there; `unsure`: an
@@ -191,12 +195,12 @@ class _Search:
 
     @property
     def jumps(self) -> np.ndarray:
-        """Return where the unstable cycle just above is not the cycle that attracts just below."""
+        """Return at which edges another cycle takes over, so that cycles above and below differ."""
         meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
         return np.isfinite(self.outside) & ~meets
 
     def follow(self) -> None:
-        """Continue upward from jumps while simulations hunt."""
+        """Move the step upward where another cycle takes over, as long as simulations hunt there."""
         jumping = np.flatnonzero(self.jumps)
         for _ in range(STEPS):
             if not jumping.size:

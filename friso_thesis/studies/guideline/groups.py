@@ -81,7 +81,7 @@ class Group:
     part: str = "stage"
 
     def of(self, flat: Mapping[str, Any]) -> Any:
-        """Return the group's value for a stage given by flat keys to SI numbers or arrays."""
+        """Return the group's value for stages, given by keys [SI] with numbers or arrays."""
         value = self.factor
         for name, power in self.powers.items():
             parameter = PARAMETERS[name]
@@ -160,7 +160,10 @@ GroupValues = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class GroupScale:
-    """Units that the groups leave open: a mass [kg], a stiffness [N/m] and a force [N]."""
+    """A mass [kg], a stiffness [N/m] and a force [N], which dimensionless groups leave open.
+
+    With them, a stage follows from its groups.
+    """
 
     mass: float = 1.0
     stiffness: float = 1.0
@@ -168,7 +171,7 @@ class GroupScale:
 
     @property
     def rate(self) -> float:
-        """Return the natural frequency [rad/s] of the mass on its bristles, the crossover's unit."""
+        """Return the natural frequency [rad/s] of the mass on its bristles, the unit of crossovers."""
         return float(np.sqrt(self.stiffness / self.mass))
 
 
@@ -221,7 +224,7 @@ def group_count(flat: Mapping[str, Any]) -> Count:
 
 
 def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the groups of a stage given by flat keys to SI numbers or arrays.
+    """Return the groups of stages, given by keys [SI] with numbers or arrays.
 
     Only groups of the stage's own parts are returned. Raises InputError for a stage without LuGre friction or without
     van Dijk's rules.
@@ -234,7 +237,7 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flat_of(values: GroupValues, scale: GroupScale = _UNIT) -> dict[str, Any]:
-    """Return flat keys of stages with given groups, in SI; the inverse of `values_of`.
+    """Return keys [SI] of stages that have these groups; the inverse of `values_of`.
 
     The stages are rigid, or have a free joint if `joint` is among the groups. `scale` sets the units that groups leave
     open.

@@ -48,7 +48,7 @@ SampleValues = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Rate:
-    """A frequency in units of sqrt(sigma_0/m).
+    """A frequency that enters a law of the edge, in units of sqrt(sigma_0/m).
 
     It is a factor times groups to the fixed powers of `base`, times further groups over their references to fitted
     powers. Powers are fitted only for those `candidates` that turn out to matter.
@@ -59,7 +59,7 @@ class Rate:
     candidates: tuple[str, ...]
 
     def fixed(self, values: SampleValues) -> np.ndarray:
-        """Return the logarithm of the part of the frequency that is not fitted, shape (count,)."""
+        """Return the logarithm of the product of groups to fixed powers, shape (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
 
@@ -68,12 +68,12 @@ Combine = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 locked edge, (count,). It returns the logarithm of the edge and its derivatives by the logarithms of the rates."""
 
 Exponent = tuple[int, str]
-"""The number of a rate and a group."""
+"""An exponent to be fitted: the index of a frequency (rate) of the law, and the group."""
 
 
 @dataclass(frozen=True)
 class EdgeLaw:
-    """A law of the edge before the fit: its rates, and how the edge follows from them."""
+    """A law of the edge before the fit: the frequencies that enter it, and how they combine."""
 
     rates: tuple[Rate, ...]
     combine: Combine
@@ -85,10 +85,10 @@ class EdgeLaw:
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law with its numbers.
+    """A law of the edge with its numbers.
 
-    `factors` belong to the rates, and `exponents` were chosen in this order. `path` is the cross-validated loss (see
-    `loss`) with no exponent, one, two, and so on.
+    `factors` belong to the frequencies (rates) that enter it. `exponents` are those fitted, in the order in which they
+    were chosen. `path` is the cross-validated loss (see `loss`) with no exponent, one, two, and so on.
     """
 
     law: EdgeLaw
@@ -97,11 +97,14 @@ class FittedLaw:
     path: tuple[float, ...] = ()
 
     def of(self, rate: int) -> dict[str, float]:
-        """Return the exponents of a rate by group."""
+        """Return the fitted exponents of one of the law's frequencies, by group."""
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
     def log_rates(self, values: SampleValues) -> np.ndarray:
-        """Return the logarithms of the rates, shape (rates, count)."""
+        """Return logarithms of the frequencies that enter the law, shape (rates, count).
+
+        The frequencies are in units of sqrt(sigma_0/m).
+        """
         parameters = np.array([*np.log(self.factors), *self.exponents.values()])
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
@@ -116,7 +119,7 @@ class FittedLaw:
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of a law, as errors of the logarithm of the edge over `count` samples.
+    """Errors of a law, taken as logarithms of the edge over the law, on `count` samples.
 
     `rms` is the root mean square; `median`, `usual` (95 % quantile) and `worst` are sizes. The ratio of the edge to the
     law lies between `least` and `most`; `safe` is its 95 % quantile.
@@ -152,13 +155,21 @@ class Errors:
 
 
 def rates_in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Combine rates whose slownesses add: edge^-power is the sum of rate^-power."""
+    """Combine frequencies whose periods add: edge^-power is the sum of rate^-power.
+
+    `rates`, shape (rates, count), are logarithms; `locked` is not used. Returned are the logarithm of the edge, and its
+    derivatives by each of the `rates`.
+    """
     total = np.logaddexp.reduce(-power * rates, axis=0)
     return -total / power, np.exp(-power * rates - total)
 
 
 def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Combine the locked edge and the largest rate: edge^-2 is the sum of both to the power -2."""
+    """Combine the largest rate with the edge of the locked joint: edge^-2 = rate^-2 + locked^-2.
+
+    `rates`, shape (rates, count), and `locked`, shape (count,), are logarithms of frequencies. Returned are the
+    logarithm of the edge, and its derivatives by each of the `rates`.
+    """
     largest = rates.argmax(axis=0)
     log, weights = rates_in_series(2.0, np.stack([rates.max(axis=0), locked]), locked)
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
@@ -200,7 +211,11 @@ def _validated(
     offset: np.ndarray,
     folds: np.ndarray,
 ) -> float:
-    """Return the cross-validated loss: on each part, of the law fitted to the other parts."""
+    """Return the cross-validated loss of a law with some exponents `chosen`.
+
+    Each part of the samples, numbered in `folds`, is predicted by the law fitted to the others. `target` are logarithms
+    of edges, and `offset` those of the locked joint.
+    """
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold
@@ -213,7 +228,10 @@ def _validated(
 def _log_coefficients(
     law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
-    """Return the logarithms of the factors, followed by the exponents."""
+    """Fit a law: return the logarithms of its factors, followed by the exponents `chosen`.
+
+    `target` are logarithms of edges, and `offset` those of the locked joint.
+    """
     features = _features(law, chosen, values)
     fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])
 
@@ -229,7 +247,10 @@ def _log_coefficients(
 
 
 def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues) -> np.ndarray:
-    """Return derivatives of the logarithms of the rates, shape (rates, parameters, count)."""
+    """Return derivatives of the logarithms of a law's frequencies by the fitted parameters.
+
+    The shape is (rates, parameters, count).
+    """
     count, rates = len(next(iter(values.values()))), len(law.rates)
     features = np.zeros((rates, rates + len(chosen), count))
     features[np.arange(rates), np.arange(rates)] = 1.0
@@ -252,16 +273,16 @@ _FRICTION = ("gap", "bristle_damping", "viscous")
 _JOINT = ("stage_share", "joint_damping", "limiter_damping", "stribeck")
 
 SLIP = Rate("slip", {"stribeck": 1.0, "gap": 1.0}, (*_TUNING, *_FRICTION))
-"""The rate sigma_0 v_s/F_s."""
+"""Frequency at which the bristles slip, sigma_0 v_s/F_s."""
 
 DROP = Rate("drop", {"stribeck": -1.0}, (*_TUNING, *_FRICTION))
-"""The rate (F_s - F_c)/(m v_s)."""
+"""Frequency at which falling friction drives the mass away, (F_s - F_c)/(m v_s)."""
 
 JOINT = Rate("joint", {"joint": 0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""The rate sqrt(k_j/m)."""
+"""Natural frequency of the joint, sqrt(k_j/m)."""
 
 STROKE = Rate("stroke", {"joint": 0.5, "stroke": -0.5}, (*_TUNING, *_FRICTION, *_JOINT))
-"""The rate sqrt(F_s/(m S_j))."""
+"""Natural frequency of a joint whose stroke just suffices, sqrt(F_s/(m S_j))."""
 
 LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(rates_in_series, 1.0))
 FREE_LAW = EdgeLaw((JOINT, STROKE), beside_locked)

@@ -26,8 +26,9 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 class ParasiticLimits:
     """Range of crossovers that a parasitic mode allows, with the joint locked and free.
 
-    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover, and has a
-    modulus margin of at least 0.5 in all settled states; None if the stage lacks this margin at its own crossover.
+    The mode has a frequency [Hz] and a damping ratio. Each range [Hz] contains the stage's own crossover. In it the
+    modulus margin is at least 0.5 in the limit cases, and in all states stuck under a bias force. The range is None if
+    the stage lacks this margin at its own crossover.
     """
 
     frequency: float
@@ -52,10 +53,10 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
 
 
 def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of a stage with changes in its settled states.
+    """Return the least modulus margin of a stage in its settled states.
 
-    Changes are flat keys to SI numbers, and the stage is sampled like the thesis's drive. The margin is 0 if a state is
-    not stable.
+    Settled states are the limit cases, and all states stuck under a bias force. `changes` are keys that are changed
+    first, in SI. The stage is sampled like the thesis's drive. The margin is 0 if a state is not stable.
     """
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 

@@ -1,4 +1,4 @@
-"""Sweep the edge of hunting over Sobol samples of the groups.
+"""Sweep the edge of hunting over quasi-random (Sobol) samples of the dimensionless groups.
 
 The sweeps are computed in parts, which are kept if a run is interrupted.
 """
@@ -62,7 +62,7 @@ LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
 
 @dataclass(frozen=True)
 class Sweep:
-    """Samples and their edges.
+    """Samples, which are stages given by their groups, and their edges of hunting.
 
     `values` are the groups, each of shape (count,), and contain the crossover at the edge (in units of sqrt(sigma_0/m),
     NaN without an edge). `locked` (count,) is the edge of the same stage with its joint locked (rigid).
@@ -73,7 +73,7 @@ class Sweep:
     edges: Edges
 
     def take(self, which: np.ndarray) -> Sweep:
-        """Select samples by numbers or by a boolean array."""
+        """Select samples by indices or by a boolean array."""
         values = {name: value[which] for name, value in self.values.items()}
         return Sweep(values, self.locked[which], Edges(*(getattr(self.edges, e.name)[which] for e in fields(Edges))))
 
@@ -84,7 +84,7 @@ class Sweep:
 
     @property
     def usable(self) -> Sweep:
-        """Return the samples with an edge in the range."""
+        """Return the samples whose edge lies in the range that was searched."""
         return self.take(self.edges.located)
 
 
@@ -132,7 +132,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
     """Return the edges of samples with a free joint, and of all samples with locked joints.
 
-    The first result has only samples with a locked edge, because the frequency of the joint is drawn relative to it.
+    The first result has only samples with a locked edge, because the frequency of the joint is chosen relative to it.
     """
     drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
@@ -161,7 +161,10 @@ def _in_parts(
 
 
 def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarray], Ensemble]:
-    """Return the stages of samples at crossovers in units of sqrt(sigma_0/m)."""
+    """Return a function that builds stages by the indices of samples and their crossovers.
+
+    Crossovers are in units of sqrt(sigma_0/m).
+    """
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
         subset = {name: value[which] for name, value in values.items()}

@@ -54,23 +54,23 @@ class Laws:
     free: FittedLaw
 
     def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] of stages with the joint locked.
+        """Return the edge [Hz] of stages with the joint locked, by the law.
 
-        Stages are given by flat keys to SI numbers or arrays.
+        Stages are given by keys [SI] with numbers or arrays.
         """
         values, rate = _shaped(flat)
         return self.locked.edge(values) * rate
 
     def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
-        """Return the edge [Hz] of stages with the joint free.
+        """Return the edge [Hz] of stages with the joint free, by both laws.
 
-        Stages are given by flat keys to SI numbers or arrays.
+        Stages are given by keys [SI] with numbers or arrays.
         """
         values, rate = _shaped(flat)
         return self.free.edge(values, self.locked.edge(values)) * rate
 
     def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return all rates of the laws [Hz], by name."""
+        """Return all frequencies [Hz] that enter the laws, by name."""
         values, rate = _shaped(flat)
         return {
             quantity.name: np.exp(log) * rate
@@ -80,7 +80,7 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return the groups as arrays of one shape, and the mass's frequency on bristles [Hz]."""
+    """Return a stage's groups as arrays of one shape, and its mass's frequency on bristles [Hz]."""
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
     arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
@@ -88,7 +88,7 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
 
 
 def plain_rig(part: str = "") -> dict[str, Any]:
-    """Return the flat keys of the rig without its parasitic mode.
+    """Return the rig's keys [SI] without its parasitic mode.
 
     The joint is left out too, unless `part` is "joint".
     """
@@ -97,7 +97,7 @@ def plain_rig(part: str = "") -> dict[str, Any]:
 
 
 def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
-    """Compute the rig with each of the changes, rigid or with its joint free."""
+    """Compute the edge of the rig with each of the changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
     keys = {key for change in changes for key in change}

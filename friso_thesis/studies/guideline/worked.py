@@ -61,8 +61,9 @@ class WorkedDesign:
     """An isolator for a crossover limit [Hz].
 
     `aim` [Hz] is the edge for which the law designs it. It has a stiffness [N/m], the stroke that it needs [m], and the
-    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin of
-    the settled states at the limit, with the rig's own friction and parasitic mode.
+    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin at
+    the limit, in the limit cases and in all states stuck under a bias force. It holds for the rig's own friction and
+    parasitic mode.
     """
 
     limit: float
@@ -112,7 +113,7 @@ class IsolatorNeed:
 class Worked:
     """The rig as a worked example of the guideline.
 
-    - `rates` [Hz], by name; `machines`, by law and by computation.
+    - `rates`: frequencies [Hz] that enter the laws, by name; `machines`: edges by law and by computation.
     - `friction`: edges of the rigid rig over the friction range.
     - `bound` [Hz]: highest edge by the law over all friction forces, with the rig's bristles and masses and the gaps
       swept.
@@ -185,7 +186,8 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
 def highest(laws: Laws) -> float:
     """Return the highest edge [Hz] of the rig by the law, over all friction forces.
 
-    The gap stays in the range. Masses and bristles are unchanged: the edge is proportional to sqrt(sigma_0/m).
+    The friction gap, over static friction, stays in the range of the sweeps. Masses and bristles are unchanged: the
+    edge is proportional to sqrt(sigma_0/m).
     """
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
     flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}

@@ -203,7 +203,7 @@ def _recorded(
 
 
 def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return time [s] and true deviation [m] of the first run, from the record's start."""
+    """Return time [s] after `since`, and the true deviation [m] of the first run from then on."""
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]

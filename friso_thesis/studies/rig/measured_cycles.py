@@ -77,15 +77,15 @@ class CycleComparison:
     """Cycles with the joint locked, at the stage's crossover.
 
     - `even`: on an even rail, one run.
-    - `field`: on rails with a random field, shape (deviations, lengths, rails). `asymmetry` is the difference in the
+    - `field`: on rails with random friction, shape (deviations, lengths, rails). `asymmetry` is the difference in the
       logarithm of static friction between the two sides of the target, at half the even rail's swing from it.
-    - `rolling`, `rolling_asymmetry`: on rails with a first harmonic, shape (harmonics, rails).
-    - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb), for the motor
-      that the drive assumes and for the weaker one of `MOTORS`.
+    - `rolling`, `rolling_asymmetry`: on rails whose friction has a first harmonic, shape (harmonics, rails).
+    - `levels`: on an even rail with other static and Coulomb friction, shape (motors, static, coulomb). The motors are
+      the one that the drive assumes and the weaker one of `MOTORS`.
     - `others`: on an even rail with one other change, by its name. If one start does not lead to a cycle, another was
       taken.
-    - `traces`: the even rail, and the varied rail with the slowest cycle of a similar swing (None: there is none), with
-      its deviation, length [m] and seed.
+    - `traces`: the even rail, and the varied rail with the slowest cycle of a similar swing (None: there is none).
+      `slowest` has the deviation, length [m] and seed of that rail.
     """
 
     even: RailRuns
@@ -117,10 +117,10 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """Return, for each bin of asymmetry (`BINS`), how often and how slowly cycles swing.
+        """Return how often and how slowly cycles swing, by the asymmetry of friction (`BINS`).
 
-        All rails with a field count. The first value is the fraction that still swings when the run ends, the second
-        the median of the periods over that of the even rail.
+        All rails with random friction count. The first value is the fraction that still swings when the run ends, the
+        second the median of the periods over that of the even rail.
         """
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):
@@ -157,7 +157,11 @@ def compare_cycles(
     machines: int,
     progress: Progress,
 ) -> CycleComparison:
-    """Compare the cycles of a stage with its joint locked, on `machines` rails of each kind."""
+    """Compare the cycles of a stage with its joint locked, on `machines` rails of each kind.
+
+    Kinds differ by the `deviations` of friction, its correlation `lengths` in swings of the stage, and `harmonics` of
+    rolling elements.
+    """
     even = on_rail(stage)
     plain = started(even, seed, {}, 1, progress, "an even rail")
     swing = float(plain.swing[0]) if plain.swings[0] else 0.01 * distance(stage)
@@ -199,9 +203,10 @@ def _longer(task: MoveTask) -> MoveTask:
 def started(
     stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, label: str
 ) -> RailRuns:
-    """Return how runs of machines end, shape (count,).
+    """Return how runs of `count` machines end, shape (count,).
 
-    Each machine takes the first start after which it keeps swinging, or else the move.
+    `changes` are their keys. Each machine is run from the move and from several other starts; the first run that keeps
+    swinging counts, or else the run from the move.
     """
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
@@ -221,9 +226,10 @@ def moves_on_varied_rails(
     progress: Progress,
     label: str,
 ) -> tuple[RailRuns, np.ndarray]:
-    """Run all moves on all rails of all cases; return runs and asymmetry at the targets.
+    """Simulate the move on every rail in every case; compare friction around the target.
 
-    Runs and asymmetries have the shape (cases * rails,).
+    `cases` lists changed rail keys, and `seeds` the seeds of the rails. The second result is the logarithm of the ratio
+    of friction half a `swing` beyond and before the target. Both results have the shape (cases * rails,).
     """
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
@@ -280,7 +286,7 @@ def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, Rai
 
 
 def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:
-    """Add, in time, the slowest of the cycles with a similar swing on rails with a field."""
+    """Add the trace over time of the slowest cycle with a similar swing on a random rail."""
     similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
     slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
     if not slower.max(initial=0.0) > 1:

@@ -32,9 +32,9 @@ STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 
 @dataclass(frozen=True)
 class StrokeCrossover:
-    """Results of moves, arrays of shape (strokes, crossovers, rails).
+    """Results of moves, as arrays of shape (strokes, crossovers, rails).
 
-    They are at `strokes` [m] and `crossovers` [Hz] on `rails` (seeds); `frequency` [Hz] is the stage's own crossover.
+    `strokes` [m], `crossovers` [Hz] and `rails` (seeds) are the axes. `frequency` [Hz] is the stage's own crossover.
     """
 
     strokes: np.ndarray
@@ -61,9 +61,10 @@ class StrokeCrossover:
 
     @property
     def limits(self) -> np.ndarray:
-        """Return each stroke's crossover [Hz] up to which any rail has counted peaks, (strokes,).
+        """Return for each stroke the crossover [Hz] up to which any rail has counted peaks.
 
-        It lies halfway to the next crossover. It is 0 if no rail has any, and infinite if some have at the highest.
+        The shape is (strokes,). The limit lies halfway to the next crossover tried. It is 0 if no rail has any, and
+        infinite if some have at the highest.
         """
         limits = np.zeros(len(self.strokes))
         for row, counted in enumerate(self.share > 0):
@@ -93,7 +94,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def stroke_crossover(
     stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray, progress: Progress
 ) -> StrokeCrossover:
-    """Run moves on a grid of strokes and crossovers, on rails.
+    """Run the move on a grid of strokes and crossovers, on a rail for each of `seeds`.
 
     `strokes` and `factors` are relative to the stage's stroke and crossover [-].
     """

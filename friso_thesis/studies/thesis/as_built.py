@@ -94,10 +94,10 @@ NOISES = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 @dataclass(frozen=True)
 class MovesOnRails:
-    """Moves of Fig. 24 and 25.
+    """Runs of the moves of Fig. 24 and 25 on several rails.
 
     `locked` has the shape (crossovers, rails), and `free`, at the first crossover, (rails,). `released` are releases
-    with the joint locked at the second crossover, shape (displacements, rails). Crossovers are in [Hz].
+    with the joint locked at the second crossover, shape (displacements, rails). Crossovers are in Hz.
     """
 
     crossovers: np.ndarray
@@ -108,10 +108,11 @@ class MovesOnRails:
 
 @dataclass(frozen=True)
 class CyclesOnRails:
-    """Cycles of Fig. 27 on an even rail, one run, and on rails that vary, shape (rails,).
+    """Runs of the cycles of Fig. 27: `even` on an even rail, `rails` on varied ones, (rails,).
 
-    `asymmetry` is that of friction about the target. `weak` is the even rail again, one run, with a motor so weak that
-    the mass line shows the measured mass (`MOTORS`), and with `COULOMB_LEVEL` times the Coulomb friction.
+    `asymmetry`, (rails,), is the logarithm of the ratio of friction on both sides of the target. `weak` is a run on the
+    even rail with `COULOMB_LEVEL` times the Coulomb friction, and a weak motor. With such a motor the rig appears to
+    have the mass that was measured (`MOTORS`).
     """
 
     even: RailRuns
@@ -123,8 +124,7 @@ class CyclesOnRails:
 def _prescribed(stage: Stage) -> Stage:
     """Return the rig with its drive, moved as Sec. 4.3.2 prescribes: by 100 mm at 100 m/s^2.
 
-    `move` takes the acceleration from this path, and rounds its 90 mm to 100 mm. The simulation's own path does not
-    matter.
+    The path written here is 90 mm long; `move` takes its acceleration and rounds the length to 100 mm.
     """
     time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
     own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}
@@ -184,10 +184,10 @@ def standstill(stage: Stage) -> InPosition:
 
 @dataclass(frozen=True)
 class RailTraces:
-    """Logs of single moves on one rail that varies, and on an even one.
+    """Positions over time in single moves, on one rail that varies and on an even one.
 
-    They have the time [s], shape (n,), and the position less the end of the move [m], by joint and crossover [Hz] and
-    by rail, each of shape (n,). `distance` [m] is the length of the move.
+    They are less the end of the move [m], each of shape (n,), at times [s], shape (n,). `moves` has them by the joint's
+    state and crossover [Hz], and `rails` by rail. `distance` [m] is the length of the move.
     """
 
     time: np.ndarray
@@ -215,11 +215,12 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 
 @dataclass(frozen=True)
 class RigLoops:
-    """Open loops and masses of the rig with its real drive.
+    """Open loops and masses of the rig, as measured with its real drive.
 
-    Loops are given locked at several settings, and free at the lowest of these, with the plant of the free joint.
-    Settings [Hz] were tried free, shape (n,); `stable` tells which were stable. Apparent masses [kg], shape (2,
-    ratios), are locked and free, for the motor constants RATIOS.
+    `locked` has the loops at several settings of the crossover, and `free` that at the lowest of these; `plant` is that
+    of the free joint. With the joint free, the `settings` [Hz], shape (n,), were tried; `stable` is true where the loop
+    was. `apparent` are masses [kg], shape (2, ratios), locked and free, for motors with the RATIOS of the force
+    assumed.
     """
 
     locked: tuple[MeasuredLoop, ...]

@@ -173,11 +173,11 @@ Judge = Callable[[Evidence], Finding]
 
 @dataclass(frozen=True)
 class Registered:
-    """A judge of a claim, and what it needs.
+    """A judge, which is a function that judges a claim, and what it needs.
 
-    It has the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the linear
-    analysis and experiments that it needs. `undrawn` names assumptions that decide on it and are in no draw. A judge
-    `of_runs` is about runs alone, so that attractors do not matter.
+    It has the figure (or equation) that shows its evidence. It also has the names of the maps, responses, parts of the
+    linear analysis and experiments that it needs. `undrawn` names assumptions that decide on the claim but are in no
+    draw of open values. A judge `of_runs` is about runs alone, so that attractors do not matter.
     """
 
     judge: Judge
@@ -195,8 +195,8 @@ def judges(
 ) -> Callable[[Judge], Judge]:
     """Register the decorated function as judge of a claim.
 
-    `undrawn` are assumed values that decide on it and are in no draw; a claim `of_runs` is not judged by attractors.
-    Raises ValueError for an unknown or taken claim.
+    `undrawn` are assumed values that decide on the claim but are in no draw of open values. A claim `of_runs` is not
+    judged by attractors. Raises ValueError for an unknown or taken claim.
     """
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")

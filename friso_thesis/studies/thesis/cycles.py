@@ -34,7 +34,7 @@ SMALLEST = 1e-3
 
 @dataclass(frozen=True)
 class Edge:
-    """A curve on which a cycle stops attracting.
+    """A curve in a map of two keys on which a cycle stops attracting.
 
     It has a kind, whether the cycle is the symmetric one, and its points [SI] along the two axes of the map, shape
     (points,) each.
@@ -75,9 +75,9 @@ class CyclesOnMap:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """Evenly spread cells of a map.
+    """Evenly spread cells of a map, and whether anything attracts the stage of each.
 
-    For each it is stored whether anything attracts its stage, and whether that is certain, in the shape of the runs.
+    `attracts` says so, and `decided` whether that is certain, in the shape of the `runs`.
     """
 
     runs: xr.Dataset
@@ -85,7 +85,7 @@ class Surveyed:
     decided: np.ndarray
 
     def attracted(self, edges: Sequence[Edge]) -> xr.Dataset:
-        """Return the runs with attraction as criterion, and distances from the edges of attraction."""
+        """Return the runs judged by what attracts, with distances of cells from the `edges`."""
         return by_attraction(by_peak_count(self.runs), self.attracts, self.decided, cells_apart(self.runs, edges))
 
 
@@ -110,7 +110,10 @@ def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
 
 
 def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
-    """Find the curves of a study's map, and compare the survey with the runs."""
+    """Follow the curves on a study's map where cycles stop attracting.
+
+    The survey of what attracts is also compared with the peaks counted in the runs.
+    """
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
     about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
@@ -118,7 +121,7 @@ def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: K
 
 
 def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
-    """Return edges as arrays by number and name."""
+    """Return curves as arrays, each named by the number of the curve and its field."""
     return {f"{n}.{key}": np.asarray(value) for n, edge in enumerate(edges) for key, value in vars(edge).items()}
 
 
@@ -169,9 +172,9 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
-    """Return the curves over a map.
+    """Return the curves over a map on which cycles stop attracting.
 
-    There are none if the axes belong to the motion, which plays no part.
+    There are none if the axes belong to the motion, which does not affect them.
     """
     if study.of_motion:
         return ()

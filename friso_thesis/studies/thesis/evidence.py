@@ -45,7 +45,7 @@ def maps_of(
 ) -> dict[str, xr.Dataset]:
     """Compute the maps of some studies by name, with `points` values per axis.
 
-    `changes` are made to the rig first.
+    `changes` are made to the rig first. A fraction `verify` of the cells is run again more accurately.
     """
     return {study.name: map_of(study, points, rtol, verify, changes) for study in studies}
 
@@ -58,7 +58,10 @@ def map_of(
     changes: Mapping[str, object] = NOTHING,
     kept: Kept = NOT_KEPT,
 ) -> xr.Dataset:
-    """Return the map of one study, from the folder or computed now."""
+    """Return the map of one study with `points` values per axis, as saved or computed now.
+
+    `changes` are made to the rig first. A fraction `verify` of the cells is run again more accurately.
+    """
     stage, axes, links = study.stage(changes), study.axes(points), dict(study.links)
     request = Request(stage, axes, None, links).study(None, rtol)
     return kept.runs(request, verify, lambda: sweep(stage, axes, links=links, rtol=rtol, verify=verify))

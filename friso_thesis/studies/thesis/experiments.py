@@ -77,7 +77,7 @@ STROKE = "8 mm"
 
 @dataclass(frozen=True)
 class LockedLine:
-    """Mass line of the locked rig (Fig. 17).
+    """The locked rig's response as measured at several places of the rail (Fig. 17).
 
     Magnitude and phase [rad] over those of the mass line have the shape (places, frequencies). The scatter of the phase
     over the places [rad] has the shape (frequencies,). All are at FREQUENCIES.

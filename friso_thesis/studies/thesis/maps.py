@@ -1,4 +1,4 @@
-"""Read maps for judges: where runs keep moving, limits, trends, and resting blocks."""
+"""Read maps for judges: where runs keep moving, limits, trends, and squares at rest."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def peak_counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
 
 
 def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
-    """Return swings at the end relative to the least that counts, shape (rows, columns).
+    """Return swings at the end over the least swing that counts, shape (rows, columns).
 
     Returns None for a map without swings.
     """
@@ -59,14 +59,17 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
 
 
 def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """Return the values below which no run keeps moving; see `ends`."""
+    """Return for each column of `moving`, (n, columns), below which value no run keeps moving.
+
+    `values` ascend, shape (n,). Limits are interpolated by the `size` of swings (see `ends`).
+    """
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
 
 def limit_error(values: np.ndarray, limits: int = 1) -> float:
     """Return the error of a limit along `values`, or of the mean of several `limits`.
 
-    A limit may lie anywhere between two neighbouring values (95 %).
+    A limit may lie anywhere between two neighbouring values; the error covers it with 95 %.
     """
     step = float(np.diff(values).max())
     return min(step / 2, step / (3 * limits) ** 0.5)
@@ -94,7 +97,7 @@ def trend_text(correlation: float) -> str:
 
 
 def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
-    """Return the fraction of valid cells in the largest square of cells that come to rest."""
+    """Return the size of the largest square of cells that come to rest, over all valid cells."""
     free = valid & ~moving
     side = free.astype(int)  # size of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
@@ -110,5 +113,5 @@ def overlap(part: np.ndarray, total: np.ndarray) -> float:
 
 
 def overlap_text(moving: np.ndarray, cells: np.ndarray) -> str:
-    """Return the overlap in words."""
+    """Write which fraction of `cells` keeps moving, or "none" without cells."""
     return f"{percent(overlap(moving, cells))}" if cells.any() else "none"

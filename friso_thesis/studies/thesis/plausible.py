@@ -1,7 +1,7 @@
-"""Judge the claims over joint draws of the values that the thesis does not state.
+"""Judge the claims for random choices of the values that the thesis does not state.
 
-The module finds in how many draws each claim holds, on which values that depends, and which draw fits the printed
-numbers best.
+Such a choice of all values is a joint draw. The module finds in how many draws each claim holds, on which values that
+depends, and which draw fits the printed numbers best.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ PARTS = {**NEEDS, **EXPERIMENTS}
 class Separation:
     """How well a value separates the draws in which a claim holds from the others.
 
-    The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if the claim holds at all the
-    larger values. `probability` is that of such a correlation by chance.
+    The `correlation` is the rank-biserial one (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if the claim holds at all the
+    larger values. `chance` is the probability of such a correlation by chance.
     """
 
     value: str
@@ -60,7 +60,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """A part of a claim over draws: number of draws in which it is `met`, and fraction."""
+    """For how many random choices of the open values a part of a claim is met, and the fraction."""
 
     met: int
     share: Share
@@ -68,12 +68,12 @@ class MetPart:
 
 @dataclass(frozen=True)
 class ClaimInSpace:
-    """Result of testing a claim of the thesis on joint random draws of the unstated values.
+    """How a claim of the thesis fares over random choices (draws) of the open values.
 
-    `seeds` identifies each draw by (random seed, number of the draw); `holds` is the fraction, and `count` the number,
-    of draws in which the claim holds, and `parts` has the fraction for each part of the claim. `hangs_on` lists the
-    drawn values that decide whether the claim holds, the most decisive first. `failures` maps the number of a draw to
-    the reason why the claim could not be computed for it.
+    `seeds` identifies each draw by (random seed, number of the draw). `holds` is the fraction, and `count` the number,
+    of draws in which the claim holds; `parts` has the fraction for each part of the claim. `hangs_on` lists the values
+    that decide whether the claim holds, the most decisive first. `failures` maps the number of a draw to the reason why
+    the claim could not be computed for it.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -85,27 +85,27 @@ class ClaimInSpace:
 
     @property
     def undecided(self) -> int:
-        """Return the number of draws in which the claim could not be computed."""
+        """Return for how many random choices of the open values the claim could not be computed."""
         return len(self.failures)
 
     @property
     def draws(self) -> int:
-        """Return the number of draws tried."""
+        """Return how many random choices of the open values were tried."""
         return len(self.seeds)
 
     @property
     def misses(self) -> int:
-        """Return the number of draws in which the claim could be computed and does not hold."""
+        """Return for how many random choices of the open values the claim does not hold."""
         return self.draws - self.undecided - self.count
 
     def met(self, part: int) -> int:
-        """Return the number of draws in which a part holds."""
+        """Return for how many random choices of the open values a part of the claim holds."""
         return self.parts[part].met
 
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that the thesis prints for a claim, its criterion, and its value in a draw."""
+    """A number that the thesis prints for a claim, its criterion, and what friso finds for it."""
 
     claim: str
     criterion: str
@@ -115,11 +115,11 @@ class PrintedNumber:
 
 @dataclass(frozen=True)
 class BestFit:
-    """The draw whose numbers are nearest to the printed ones.
+    """The random choice of open values whose numbers are nearest to the printed ones.
 
-    friso's own choice counts as one draw, numbered -1. `misfit` is the root mean square of the logarithms of the
-    ratios, and `at_baseline` that of friso's choice. All are on maps of `POINTS` values per axis. `numbers` are the
-    numbers compared.
+    friso's own choice counts as one, numbered -1. `misfit` is the root mean square of the logarithms of found over
+    printed numbers, and `at_baseline` that of friso's choice. All are on maps of `POINTS` values per axis. `numbers`
+    are the numbers compared.
     """
 
     draw: Draw
@@ -130,7 +130,7 @@ class BestFit:
 
 @dataclass(frozen=True)
 class Plausible:
-    """All claims over the joint draws, by name.
+    """Results on all claims, by name, for random choices of the open values.
 
     There are the best fit (None without draws), and the findings at friso's `own` choice, on maps of `POINTS` values
     per axis.
@@ -148,7 +148,7 @@ def plausible(
     kept: Kept = NOT_KEPT,
     tally: Tally | None = None,
 ) -> Plausible:
-    """Judge the claims over `draws` joint draws.
+    """Judge the claims for `draws` random choices of the values that the thesis leaves open.
 
     friso's own choice is computed as one more, for the best fit.
     """
@@ -192,12 +192,12 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
-    """Return the finding of a judge by the thesis's count."""
+    """Return the finding of a judge, with hunting judged by the thesis's peak count."""
     return entry.judge(by_way(base, by_peak_count))
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """Judge the claims in one draw.
+    """Judge the claims in one draw of the open values, and return the findings by claim.
 
     A claim that cannot be computed there gets the reason.
     """
@@ -216,7 +216,7 @@ def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
 
 
 def _failure(error: Exception) -> Finding:
-    """Return the finding for a claim that is undecided in a draw because of an error."""
+    """Return the finding for a claim that an error leaves undecided, for some open values."""
     return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
 
 
@@ -245,15 +245,18 @@ def _in_space(
 
 
 def _met(column: Sequence[bool | None], count: int) -> MetPart:
-    """Return in how many of `count` draws a part is met; in the others it is undecided."""
+    """Return in how many of `count` random choices of the open values a part of a claim is met.
+
+    In those that `column` lacks, or has as None, it is undecided.
+    """
     flags = np.array([holds for holds in column if holds is not None], bool)
     return MetPart(int(flags.sum()), _share(flags, count))
 
 
 def _share(flags: np.ndarray, count: int) -> Share:
-    """Return the fraction of `count` draws.
+    """Return the fraction of true flags among `count` random choices, with its interval.
 
-    Draws without a flag count as undecided.
+    Choices without a flag count as undecided.
     """
     missing = count - len(flags)
     return share(
@@ -262,7 +265,7 @@ def _share(flags: np.ndarray, count: int) -> Share:
 
 
 def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) -> Iterator[Separation]:
-    """Yield the values that separate the draws by more than chance.
+    """Yield the open values that separate draws in which a claim holds, by more than chance.
 
     The test is Mann and Whitney's, with Bonferroni's correction.
     """
@@ -287,7 +290,7 @@ def _fit(
 ) -> BestFit | None:
     """Return the draw, or friso's `own` choice, that fits the printed numbers best.
 
-    The count decides. A draw of which a number is unknown is left out.
+    Hunting is judged by the peak count. A draw of which a number is unknown is left out.
     """
     first = baseline()
     at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]

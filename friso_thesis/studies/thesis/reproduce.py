@@ -202,9 +202,10 @@ def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
 def _by_attraction(
     entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], cycles: Mapping[str, CyclesOnMap]
 ) -> Finding | None:
-    """Return the finding by what attracts the stages, or None.
+    """Judge a claim by what attracts the stages of its maps, instead of by counted peaks.
 
-    It is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not depend.
+    The result is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not
+    depend.
     """
     maps = entry.needs & STUDIES.keys()
     if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):
@@ -215,9 +216,9 @@ def _by_attraction(
 
 
 def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[str, Finding]:
-    """Return the findings by other readings of the thesis's `words`.
+    """Return the findings by other meanings of the thesis's `words`, such as “about”.
 
-    Only words by which the claim is judged are read otherwise. The result is by the change of reading.
+    Only words by which the claim is judged are read otherwise. The result is by the change of meaning.
     """
     findings = {}
     for name, other in others_of(words).items():
@@ -248,7 +249,7 @@ def _others(
 
 
 def _second(runs: xr.Dataset) -> xr.Dataset:
-    """Return every second value of each axis; for fewer than five values, all."""
+    """Return the runs at every second value of each axis; an axis of fewer than five keeps all."""
     return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
 
 

@@ -1,4 +1,4 @@
-"""Define plausible ranges of values that the thesis does not state, and draw them jointly."""
+"""Define plausible ranges of values that the thesis does not state, and sample them jointly."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
 class OpenValue:
     """A value that the thesis leaves open, from `low` to `high` [unit].
 
-    `scale` tells how it is drawn: evenly, in its logarithm, or as one of the two ends. It has the keys of the stage
+    `scale` tells how it is sampled: evenly, in its logarithm, or as one of the two ends. It has the keys of the stage
     file that it sets, why it may lie anywhere in the range, and friso's own choice (`baseline`).
     """
 
@@ -49,7 +49,7 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Tell whether another value may change the study's map."""
+        """Tell whether changing the value may change the study's map."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:
@@ -60,7 +60,7 @@ class OpenValue:
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether another value may change that part of the analysis or that experiment."""
+        """Tell whether changing the value may change that part of the analysis or that experiment."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 
@@ -127,16 +127,16 @@ OPEN: tuple[OpenValue, ...] = (
 
 
 def draw_name(number: int) -> str:
-    """Return the name of a draw.
+    """Return the name of a random choice of the open values.
 
-    Names count from 1, seeds from 0.
+    Names count from 1, numbers from 0.
     """
     return f"draw {number + 1}"
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One joint draw: its number, and its values by name, in the order of `OPEN`."""
+    """One random choice of all open values: its number, and its values by name, as in `OPEN`."""
 
     number: int
     values: Mapping[str, float]
@@ -147,7 +147,7 @@ class Draw:
 
     @property
     def changes(self) -> dict[str, Any]:
-        """Return the changes of the draw in the stage file of the rig."""
+        """Return the keys that these values set in the rig's stage file, with their new values."""
         v = self.values
         ratio, mass = v["cruise over acceleration time"], v["mass"]
         time = np.sqrt(v["distance"] / (v["acceleration"] * (1 + ratio)))
@@ -172,9 +172,9 @@ class Draw:
 
 
 def draw(number: int) -> Draw:
-    """Return the joint draw with a number, from 0 on.
+    """Return one random choice of all open values, identified by a number from 0 on.
 
-    Its values are independent of each other, and of other draws.
+    The values are independent of each other, and of choices with other numbers.
     """
     shares = np.random.default_rng([SEED, number]).random(len(OPEN))
     return Draw(number, {value.name: value.at(float(share)) for value, share in zip(OPEN, shares, strict=True)})
@@ -189,7 +189,8 @@ def enters(value: OpenValue, needs: frozenset[str], responses: Mapping[str, Mapp
            parts: Mapping[str, PartNeeded]) -> bool:  # fmt: skip
     """Tell whether a value can change anything that a judge `needs`.
 
-    Needs are maps, `responses` by what they change in the rig, and `parts` of the analysis.
+    Needs are names of maps, responses and parts of the analysis. `responses` says what each response changes in the
+    rig.
     """
     for name in needs:
         if name in STUDIES:

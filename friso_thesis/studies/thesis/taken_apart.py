@@ -18,7 +18,9 @@ _SCALARS = str, int, float, bool, NoneType
 
 def taken_apart(result: Any) -> dict[str, np.ndarray]:
     """Return the arrays of a result, by their number, and the rest as a text in JSON.
-    A result is a dataclass, a tuple, a mapping, an array, a slice, a number, a text or None, or made of these."""
+
+    A result is a dataclass, a tuple, a mapping, an array, a slice, a number, a text or None, or made of these.
+    """
     arrays: dict[str, np.ndarray] = {}
     tree = _tree(result, arrays)
     return {**arrays, _TREE: np.array(json.dumps(tree))}

@@ -23,13 +23,13 @@ NO_FINDINGS: Mapping[str, Finding] = MappingProxyType({})
 class ClaimVerdict:
     """The verdict on a claim by the thesis's count; `finding` is None if it is not covered.
 
-    - `attracts`: the finding by what attracts the stages (None: not computed, or it does not enter). It stands beside
+    - `attracts`: the finding by what attracts the stages (None: not computed, or it does not matter). It stands beside
       the judgement and does not decide it.
-    - `space`: the claim over joint draws of the values that the thesis leaves open (None: none enters, or no draw was
+    - `space`: the claim over random draws of the values that the thesis leaves open (None: none matters, or no draw was
       made).
-    - `undrawn`: other assumptions that decide on it, and are in no draw.
-    - `turned`: change of the judgement by another grid, or by the thesis's tolerance, by the name of that method.
-    - `reread`: findings by other readings of the thesis's words that turn a criterion, by the change.
+    - `undrawn`: other assumptions that decide on the claim, and are in no draw.
+    - `turned`: how another grid, or the thesis's tolerance, changes the judgement, by the name of that method.
+    - `reread`: findings by other meanings of the thesis's words that turn a criterion, by the change.
     """
 
     claim: Claim
@@ -44,7 +44,7 @@ class ClaimVerdict:
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement at friso's own choice of open values, and over their joint draws.
+        """Return the judgement, at friso's own choice of the open values and at random ones.
 
         A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
         open if it holds at friso's choice or in some draw, but not so often.
@@ -70,7 +70,7 @@ class ClaimVerdict:
 
     @property
     def dependence(self) -> str:
-        """Say in which fraction of the draws a claim holds, and on what that depends."""
+        """Say for which fraction of random open values a claim holds, and on what that depends."""
         if self.finding is None:
             return ""
         if self.space is None:
@@ -100,13 +100,13 @@ class ClaimVerdict:
         return ", ".join(item.value for item in self.space.hangs_on) if self.space else ""
 
     def _word_of(self, finding: Finding) -> str:
-        """Return the judgement by another reading."""
+        """Return the judgement by another meaning of a word: its name, or "still" and the own one."""
         own = self.finding.judgement if self.finding else ""
         return finding.judgement if finding.judgement != own else f"still {own}"
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """Return the fraction of the joint draws in words."""
+    """Write for which fraction of the random choices of open values a claim holds."""
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 
@@ -155,7 +155,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Say how another finding is judged, with the numbers of the parts that differ."""
+    """Say how the claim is judged by the second finding, with numbers of parts that differ."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

@@ -24,10 +24,10 @@ whatever the move."""
 
 
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
-    """Return the runs with the numbers that judges read, by the thesis's count.
+    """Return the runs with the numbers that judges read, by the thesis's peak count.
 
-    They are whether at least one peak is counted, the count, the final swing over the height from which peaks count,
-    and whether the stage hunts for good (`lasts`): with this criterion, whether the run swings at its end.
+    They are whether a peak is counted, and how many are. Further, there are the final swing over the height from which
+    peaks count, and whether the run still swings at its end (`lasts`).
     """
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),
@@ -38,7 +38,7 @@ def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
 
 
 def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, apart: np.ndarray) -> xr.Dataset:
-    """Return the runs with the numbers that judges read, by attraction in each cell.
+    """Return the runs with the numbers that judges read, by what attracts each stage.
 
     The arrays have the runs' shape; uncertain cells are left out. A stage with an attractor also `lasts`. How often a
     cycle repeats in a run is known only if the move ended in it. `apart` are the distances of the cells from the curves
@@ -52,6 +52,6 @@ def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, a
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:
-    """Return the evidence with its maps and responses read by one criterion."""
+    """Return the evidence, whose maps and responses are judged by one criterion through `read`."""
     responses = {name: Response(read(item.cell), item.trace) for name, item in evidence.responses.items()}
     return replace(evidence, maps={name: read(runs) for name, runs in evidence.maps.items()}, responses=responses)

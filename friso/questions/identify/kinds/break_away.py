@@ -17,7 +17,7 @@ from friso.shown.drawing.prefixes import range_with_unit
 
 
 def _facts(result: BreakAway) -> Facts:
-    """List static friction, overall and by direction, and the logs from which it was read."""
+    """List static friction, overall and by direction, with number and force rates of the ramps."""
     facts = [
         ("Static friction", with_interval(result.static)),
         ("Forward", with_interval(result.forward)),

@@ -32,7 +32,7 @@ from friso.shown.drawing.figure import (
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:
-    """List friction over speed by direction, the constant force, and friction along the rail."""
+    """List friction over speed, by direction and for both, and friction along the rail."""
     facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
     facts += [
         ("Friction, both directions", _direction_text(result.velocity.both)),
@@ -60,7 +60,7 @@ def _direction_text(direction: Direction) -> str:
 
 
 def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
-    """Return friction over speed and over place, for the document."""
+    """Return friction over speed and over position on the rail, for the document."""
     sides = {**result.velocity.directions, "both": result.velocity.both}
     passes = [
         {
@@ -133,7 +133,7 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
 
 
 def _position(friction: FrictionPosition, name: str) -> list[Figure]:
-    """Draw the force over the place, pass by pass."""
+    """Draw the friction force over the position on the rail, pass by pass."""
     if not friction.passes:
         return []
     colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))

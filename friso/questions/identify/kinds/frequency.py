@@ -19,7 +19,7 @@ from friso.shown.drawing.prefixes import range_with_unit
 
 
 def _sentences(bench: Bench) -> tuple[str, ...]:
-    """Say what the response shows, and whether friction explains its lower end."""
+    """Say what the response shows, and whether friction explains where it is not linear."""
     sentences = [f"{text[0].upper()}{text[1:]}." for text in (bench.seen.words[-1:] if bench.seen else ())]
     if bench.departs is not None and bench.departs.frequency.determined:
         below = digits(bench.departs.frequency.value, "Hz")
@@ -29,7 +29,10 @@ def _sentences(bench: Bench) -> tuple[str, ...]:
 
 
 def _friction(bench: Bench) -> str:
-    """Say whether a simulation with friction explains the departure."""
+    """Say which part of the response's departure from the linear model friction explains.
+
+    This part was computed with a simulated mass with Coulomb friction on a spring.
+    """
     assert bench.explanation is not None
     share = 1 - bench.explanation.left
     verb = "explains" if share > 0.5 else "does not explain"
@@ -38,7 +41,7 @@ def _friction(bench: Bench) -> str:
 
 
 def _facts(bench: Bench) -> Facts:
-    """List lines, modes, masses and joint, friction, and how one log predicts the other."""
+    """List mass lines, modes, masses and joint, friction, and how one log predicts the other."""
     facts = [("Band of the models", range_with_unit(*bench.band, "Hz"))]
     for line in bench.lines:
         place = _place(line)
@@ -65,7 +68,7 @@ def _place(line: StraightLine) -> str:
 
 
 def _headline(bench: Bench) -> str:
-    """Say what masses and modes a response shows, and what its units keep from the stage file."""
+    """Say which masses and modes a response shows, and which units the stage file still needs."""
     sentences = []
     names = ("total mass", "antiresonance frequency", "resonance frequency")
     if bench.two_masses is not None:
@@ -82,7 +85,7 @@ def _headline(bench: Bench) -> str:
 
 
 def _without_units(force: str, motion: str) -> str:
-    """Say which units keep masses and stiffness out of the stage file.
+    """Say that masses and stiffness enter the stage file only with a force in N and motion in m.
 
     A unit "1" means that the log states none.
     """
@@ -125,7 +128,7 @@ def _numbers(bench: Bench) -> dict[str, Any]:
 
 
 def _line_numbers(line: StraightLine) -> dict[str, Any]:
-    """Return a straight line, for the document."""
+    """Return a straight line fitted to a frequency response, for the document."""
     band = {"kind": line.kind, "low_hz": line.low, "high_hz": line.high, "sign": line.sign}
     return {**band, "level": estimate_document(line.level), "value": estimate_document(line.value)}
 

@@ -46,7 +46,10 @@ def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
 
 
 def _facts(moves: IdentifiedMoves) -> Facts:
-    """List both fits of the inverse model, the errors of the output-error fit, and the residual."""
+    """List fits of the inverse model, errors of the simulation, and the residual force.
+
+    The inverse model computes the force from the motion, for both directions together and for each.
+    """
     residual = moves.residual
     correlation = (
         "uncorrelated from sample to sample"
@@ -79,14 +82,14 @@ def _errors(moves: IdentifiedMoves) -> str:
 
 
 def _inverse_text(model: InverseModel) -> str:
-    """Write the estimates of an inverse model in words."""
+    """Write the estimates of an inverse model, which computes the force from the motion."""
     text = f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
     falling = any(one.name.startswith("viscous") and one.high < 0 for one in model.estimates)
     return f"{text}; {FALLING}" if falling else text
 
 
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
-    """Return both models of a log of moves, for the document."""
+    """Return the inverse model and the simulated model of a log of moves, for the document."""
     low, high = moves.covered.gap
     parameters = {
         parameter.name: {"unit": unit_shown(parameter.unit), "value": moves.fit.value(parameter.name)}
@@ -116,7 +119,7 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 
 def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
-    """Return an inverse model, for the document."""
+    """Return an inverse model, which computes the force from the motion, for the document."""
     named = {
         f"{estimate.name.replace(' ', '_')}{unit_suffix(estimate.unit)}": ends_document(estimate)
         for estimate in model.estimates
@@ -138,15 +141,15 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 
 def _profile_numbers(profile: Profile) -> dict[str, Any]:
-    """Return the profile of a parameter, for the document."""
+    """Return how much worse the fit becomes as one parameter is varied, for the document."""
     ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
     return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
 def _headline(moves: IdentifiedMoves) -> str:
-    """Say what is identified if the force is not in newtons, which no stage file takes.
+    """List what is identified if the force is not in newtons, as it must be in a stage file.
 
-    Values are then per unit of that force.
+    Values are then in units of that force; the sentence says how to give its scale. It is empty for a force in newtons.
     """
     if moves.force_unit == "N":
         return ""

@@ -113,7 +113,7 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
 
 
 def _turned(response: Array, average: Array) -> Array:
-    """Return the phase [deg] of a response, in the same turns as the phase of the average."""
+    """Return the phase [deg] of a response, within half a turn of the average's phase."""
     angle = phases([average])[0]
     return angle + np.degrees(np.angle(response / average))
 

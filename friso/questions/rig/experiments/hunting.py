@@ -97,7 +97,10 @@ def _limit(moves: HuntingResult, case: str) -> str:
 
 
 def _started(moves: HuntingResult) -> list[str]:
-    """Say on how many rails a release starts hunting that the move does not start."""
+    """Say on how many rails peaks are counted after the move, and after the move or a release.
+
+    A second sentence describes a run that rests after the move but swings after a release.
+    """
     counts = [
         f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} "
         f"at {moves.crossovers[row]:.3g} Hz"
@@ -153,7 +156,7 @@ def _locked_and_free(moves: HuntingResult) -> Figure:
 
 
 def _on(moves: HuntingResult) -> str:
-    """Name the rail that is shown, if there are several."""
+    """Say on which rail the figure's run was made; empty if there is only one rail."""
     return _rail(moves, moves.rail, ",")
 
 
@@ -163,7 +166,7 @@ def _rail(moves: HuntingResult, number: int, before: str) -> str:
 
 
 def _reach(traces: list[Trace]) -> float:
-    """Return half the height [m] of a panel that shows what remains after the move."""
+    """Return half the height [m] of a panel in which the motion after the move is well seen."""
     late = [np.abs(t.deviation[t.time >= AFTERWARDS]).max() for t in traces]
     return 1.6 * max(float(np.nanmax(late)), 2 * COUNTED_ABOVE)
 
@@ -193,7 +196,10 @@ def _crossovers(moves: HuntingResult) -> Figure:
 
 
 def _shares(moves: HuntingResult) -> Figure:
-    """Draw the fraction of rails with counted peaks over the crossover, with its interval."""
+    """Draw the fraction of rails with counted peaks over the crossover.
+
+    The interval of the fraction is drawn for the locked joint only.
+    """
     bands, lines = [], []
     for case, colour in COLOURS.items():
         shares = moves.shares(case)

@@ -70,7 +70,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _rails(result: Stiction, subject: str) -> Figure:
-    """Draw the break-away forces of each rail over the true static friction."""
+    """Draw the break-away forces of each rail, over the range of its true static friction."""
     numbers_ = np.arange(1.0, len(result.by_rail) + 1)
     rows = np.concatenate([np.full(len(slips.forces), n) for n, slips in zip(numbers_, result.by_rail, strict=True)])
     truth = Band(numbers_, result.true[:, 0], result.true[:, 1], "true static friction along the travel", "#cfdfee")

@@ -79,9 +79,9 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
 
 @lru_cache(maxsize=256)
 def _margins(stage_file: str) -> dict[float, float]:
-    """Return the settled states' modulus margin by the mass [kg] that the controller assumes.
+    """Return the least modulus margin by the mass [kg] that the controller assumes.
 
-    The margin is 0 for an unstable loop.
+    It is that of the limit cases, and of all states stuck under a bias force; 0 if one is unstable.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     whole = flat["masses.cart"] + flat["masses.stage"]
@@ -91,7 +91,7 @@ def _margins(stage_file: str) -> dict[float, float]:
 
 @judges("S342", figure="Sec. 3.4.2, mass the controller is tuned for", needs=(FREE,))
 def the_mass_to_tune_for(evidence: Evidence) -> Finding:
-    """Judge for which mass to tune, by the margins of all settled states over the tuning mass."""
+    """Judge for which mass the controller should be tuned, by the modulus margin that follows."""
     margins = _margins(evidence.rig.to_toml())
     (small, of_small), *_, (_, whole) = margins.items()
     best = max(margins, key=lambda mass: margins[mass])
@@ -116,7 +116,7 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
 
 @judges("S352", figure="Sec. 3.5, acceleration")
 def close_to_ten_g(evidence: Evidence) -> Finding:
-    """Judge the acceleration by the peak force over the weighed and the identified mass."""
+    """Judge whether the peak force accelerates the masses weighed and identified by about 10 g."""
     reached = [_PEAK_FORCE / mass / _GRAVITY for mass in _MASSES]
     rows = tuple((f"{mass:g} kg", f"{_PRESCRIBED * mass:g} N", f"{_PEAK_FORCE:g} N") for mass in _MASSES)
     return Finding(

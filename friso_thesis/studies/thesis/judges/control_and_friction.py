@@ -26,7 +26,10 @@ _GAP = 1.0
 
 @judges("F12A", figure="12A", needs=("friction",))
 def gap_makes_hunting(evidence: Evidence) -> Finding:
-    """Judge the smallest gap at which runs keep moving, and how the count depends on the gap."""
+    """Judge how static minus Coulomb friction decides on hunting.
+
+    The finding has the smallest such gap at which runs keep moving, and how the peak count depends on it.
+    """
     words = reading()
     axes = ("friction.static", "friction.coulomb")
     static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], *axes)

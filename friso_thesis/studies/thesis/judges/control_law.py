@@ -81,9 +81,10 @@ def _written(expression: sp.Expr) -> str:
 
 @lru_cache(maxsize=256)
 def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
-    """Return the modulus margin of settled states, joint free, by crossover (0: not stable).
+    """Return the least modulus margin with the joint free, by crossover; 0 if not stable.
 
-    Crossovers are relative to the `first` eigenfrequency [Hz].
+    Crossovers are relative to the `first` eigenfrequency [Hz]. The margin is that of the limit cases, and of all states
+    stuck under a bias force.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     reach = 2 * JudgeSettings.current().far_crossover_factor
@@ -93,7 +94,10 @@ def margins_over_crossover(stage_file: str, first: float) -> dict[float, float]:
 
 @judges("S342F", figure="Sec. 3.4.2, crossover and first mode", needs=(PLANT, "isolator-crossover"), of_runs=True)
 def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
-    """Judge the crossover by the free joint's margin, and by force and settling time."""
+    """Judge where the crossover may lie beside the free joint's first mode.
+
+    Margin, force and settling time over the crossover decide.
+    """
     first = evidence.analysis.plants["stuck"].first
     runs = evidence.maps["isolator-crossover"]
     crossover, _, moving, valid = verdict_table(runs, CROSSOVER, "joint.stroke")
@@ -143,7 +147,10 @@ def judged_crossovers(margins: dict[float, float], first: float, force: float, s
 
 @judges("S421", figure="Sec. 4.2.1, motor constant")
 def motor_constant_cancels(evidence: Evidence) -> Finding:
-    """Judge the loop with a stronger or weaker motor, tuned for the mass that it shows."""
+    """Judge whether a wrong motor constant leaves the open loop unchanged.
+
+    The controller is tuned for the mass that such a motor appears to move.
+    """
     flat = evidence.rig.flat()
     omega = 2 * np.pi * np.geomspace(0.1, 1e3, 100)
     own = loops(flat, member(1.0), omega)

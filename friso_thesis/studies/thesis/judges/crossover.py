@@ -52,7 +52,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
 
 @judges("F16B", figure="16B", needs=("isolator-crossover", "isolator-crossover-soft"))
 def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
-    """Judge the limits of both stiffnesses, stroke by stroke."""
+    """Judge whether a softer joint lowers the crossover from which on the rig comes to rest."""
     words = reading()
     names = ("isolator-crossover", "isolator-crossover-soft")
     stiff, soft = (_limits(evidence.maps[name]) for name in names)

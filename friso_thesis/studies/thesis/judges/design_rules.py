@@ -38,7 +38,7 @@ _RATIOS = np.geomspace(2.0, 80.0, 16)
 
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
 def rules_of_design(evidence: Evidence) -> Finding:
-    """Judge each design rule by the parameter maps, and the one on parasitic modes linearly."""
+    """Judge the design rules by maps of parameters, and the one on parasitic modes by margins."""
     rig = evidence.rig
     strokes = _stroke(evidence), _softer_needs_less_stroke(evidence)
     return Finding((_soft(evidence), _far(rig), *strokes, _gap(evidence), *_crossovers(evidence), _up_to(rig)))
@@ -64,7 +64,7 @@ def _soft(evidence: Evidence) -> Part:
 def _needed_ratio(stage_file: str) -> float:
     """Return the least ratio of parasitic frequency to crossover for a modulus margin of 0.5.
 
-    The margin must hold in all settled states. The result is NaN if the rig never has it.
+    The limit cases must have this margin, and the rig stuck under any bias force. The result is NaN if it never does.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
@@ -78,9 +78,9 @@ def _needed_ratio(stage_file: str) -> float:
 
 @lru_cache(maxsize=256)
 def _margins_at_the_top(stage_file: str) -> dict[str, float]:
-    """Return the least modulus margin of the settled states at the highest crossover.
+    """Return the least modulus margin at the highest crossover, joint locked and free.
 
-    It is given with the joint locked and free; 0 if unstable.
+    It is that of the limit cases, and of all states stuck under a bias force; 0 if one is unstable.
     """
     flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
@@ -158,9 +158,9 @@ def _gap(evidence: Evidence) -> Part:
 
 @cache
 def _locked_edge() -> str:
-    """Say up to which crossover the cycle of the locked rig attracts, with the mass of the rule.
+    """Say up to which crossover a cycle of the locked rig attracts, with the abstract's mass.
 
-    `friso check` gives the crossover.
+    It is computed as `friso check` does.
     """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
@@ -210,7 +210,7 @@ def locked_limit(evidence: Evidence, mass: float) -> float:
 
 @judges("F25P", figure="25", needs=("system",))
 def experiment_needs_more_crossover(evidence: Evidence) -> Finding:
-    """Judge the limit of the parameter study at its own mass, beside that of the experiment."""
+    """Judge whether the experiment needs more crossover than the parameter study at its mass."""
     weighed, moving = (locked_limit(evidence, mass) for mass in (_WEIGHED, _MOVING_MASS))
     return Finding(
         (

@@ -38,12 +38,12 @@ _UNIFORM = "uniform friction along the rail, no noise"
 
 @judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
-    """Judge the position steps of the rig with its cart fixed."""
+    """Judge the joint's stiffness from position steps of the rig with its cart fixed."""
     return judged_steps(evidence.experiments.joint_steps)
 
 
 def judged_steps(steps: JointSteps) -> Finding:
-    """Judge simulated position steps."""
+    """Judge the joint's stiffness from simulated position steps."""
     words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
@@ -80,7 +80,7 @@ def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
 
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
-    """Judge simulated slow motion."""
+    """Judge static friction from simulated slow motion, in which the cart sticks and slips."""
     slips = sum(len(run.result.forces) for run in runs)
     forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
@@ -145,7 +145,7 @@ def _swing_text(share: float) -> str:
 
 
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
-    """Judge the passes with the real drive."""
+    """Judge the force of passes at constant speed with the real drive, joint free and locked."""
     words = reading()
     named = {"free": free, "locked": locked}
     swings = {name: force_swings(runs) for name, runs in named.items()}
@@ -187,7 +187,7 @@ def _between(shares: list[float]) -> str:
 
 
 def _interval(estimate: Estimate) -> str:
-    """Return a correlation with its interval."""
+    """Write a correlation with its interval."""
     if not estimate.determined:
         return "not determined"
     return f"{estimate.value:.2f} ({estimate.low:.2f} to {estimate.high:.2f})"

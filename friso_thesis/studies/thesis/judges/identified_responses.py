@@ -79,7 +79,10 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
 
 @judges("F18", figure="18", needs=(PLANT, BUILT))
 def response_of_the_free_joint(evidence: Evidence) -> Finding:
-    """Judge the free joint's modes and mass line, and whether one error explains both masses."""
+    """Judge modes and mass line with the joint free, and a wrong motor constant.
+
+    The question is whether one error of the constant explains both masses that the thesis identified.
+    """
     words = reading()
     plants = evidence.analysis.plants
     stuck, sliding = plants["stuck"], plants["sliding"]

@@ -43,9 +43,9 @@ def ranks_of_influence(evidence: Evidence) -> Finding:
 
 @lru_cache(maxsize=8)
 def influences(stage_file: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the rank-biserial correlation of every parameter with counted peaks.
+    """Return how each parameter correlates with counted peaks, joint locked and joint free.
 
-    It is given with the joint locked, and free.
+    The measure is the rank-biserial correlation.
     """
     locked = [STUDIES[name] for name in _LOCKED]
     free = [STUDIES[name] for name in _FREE] + [STUDIES["isolator-damping"], STUDIES["isolator-crossover"]]
@@ -53,7 +53,10 @@ def influences(stage_file: str) -> tuple[dict[str, float], dict[str, float]]:
 
 
 def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]:
-    """Return the correlations over stages drawn evenly from the ranges of some studies."""
+    """Return the correlation of each parameter with counted peaks, joint locked or free.
+
+    Stages are drawn evenly from the ranges of some studies.
+    """
     spans = {span.key: span for study in studies for span in study.spans}
     links = {key: text for study in studies for key, text in study.links.items()}
     ranges = {key: span.text(2).rsplit(":", 2)[0] + (":log" if span.log else "") for key, span in spans.items()}
@@ -107,5 +110,5 @@ def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Find
 
 
 def _listed(of: Mapping[str, float], order: list[str]) -> str:
-    """Return the parameters with their correlations, the most decisive first."""
+    """Return the four most decisive parameters with their correlations, the most decisive first."""
     return ", ".join(f"{key} {of[key]:+.2f}" for key in order[:4])

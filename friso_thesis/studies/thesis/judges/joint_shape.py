@@ -39,7 +39,7 @@ def shortening_is_negligible(evidence: Evidence) -> Finding:
 
 
 def judged_shortening(leaves: Evaluation) -> Finding:
-    """Judge leaf springs at full stroke."""
+    """Judge how nonlinear leaf springs are, and how much they shorten, at full stroke."""
     share, least = leaves.shortening / leaves.stroke, JudgeSettings.current().negligible_share
     return Finding(
         (
@@ -73,7 +73,10 @@ def _ratios(dimension: str) -> tuple[float, float, float]:
 
 
 def judged_dimensions(wider: tuple[float, float, float], longer: tuple[float, float, float]) -> Finding:
-    """Judge the factors on the stiffnesses of wider and of longer leaves."""
+    """Judge by which factors wider leaves, and longer leaves, change three stiffnesses.
+
+    The stiffnesses are that of the drive, along the leaves, and along their width.
+    """
     words, settings = reading(), JudgeSettings.current()
     alike, larger = settings.negligible_share, settings.leaf_change_factor
     drive, along, across = wider
@@ -107,9 +110,10 @@ def pushed_at_the_centre(evidence: Evidence) -> Finding:
 
 
 def judged_place(stiffness: np.ndarray, length: float) -> Finding:
-    """Judge the place from the stage's stiffness (6, 6) at the ends of leaves of a length [m].
+    """Judge at which place a force does not tilt the stage, from its stiffness matrix (6, 6).
 
-    A force F along z that acts at a distance d from the leaf ends exerts the moment -d F about y.
+    The stiffness is taken at the ends of leaves of a length [m]. A force F along z that acts at a distance d from the
+    leaf ends exerts the moment -d F about y.
     """
     words = reading()
     compliance = np.linalg.inv(stiffness)

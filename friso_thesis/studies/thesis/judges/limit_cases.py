@@ -37,7 +37,10 @@ def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
 
 
 def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
-    """Judge the free joint's eigenfrequency, and its frequency pair if the cart slides."""
+    """Judge the free joint's first resonance, and whether an antiresonance lies below it.
+
+    There should be one if the cart slides, and none if it is stuck.
+    """
     words = reading()
     low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
     pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
@@ -57,7 +60,7 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
 
 
 def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
-    """Judge the parasitic mode, and the pair of frequencies above it if the limiter is touched."""
+    """Judge the parasitic mode, and the two modes above it if the limiter is touched."""
     words = reading()
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}

@@ -56,7 +56,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 
 def _beyond(locked: CrossoverLoops) -> str:
-    """Say what else crosses 0 dB at the highest setting."""
+    """Say where the locked loop, tuned to the highest setting, crosses 0 dB again."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
@@ -86,7 +86,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
-    """Judge the crossings of the locked rig, sliding, at the thesis's settings."""
+    """Judge whether loops of the locked rig, sliding, cross 0 dB where they are tuned."""
     words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
@@ -127,7 +127,7 @@ def _why_elsewhere(contact: Contact) -> str:
 
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
-    """Judge whether a further crossing takes the loop close to instability."""
+    """Judge whether a further crossing of 0 dB takes the loop close to instability."""
     close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
@@ -148,9 +148,9 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
-    """Judge the free joint's crossing, tuned for the whole mass, and its highest setting.
+    """Judge where the loop of the free joint, tuned for the whole mass, crosses 0 dB.
 
-    The setting is the highest stable one.
+    The highest crossover up to which it is stable is judged as well.
     """
     words = reading()
     analysis = evidence.analysis
@@ -206,7 +206,7 @@ def _hertz(crossover: float | None) -> str:
 
 
 def _sampled(analysis: Linear) -> FindingTable:
-    """Return a table of what sampling and delays leave of the highest stable crossover."""
+    """Return a table of the highest stable crossover with sampling, by delay."""
     rows = tuple(
         (_micro(delay), _hertz(free), _hertz(analysis.locked.sampled[delay]))
         for delay, free in analysis.free.sampled.items()

@@ -13,7 +13,7 @@ from friso_thesis.studies.thesis.studies import STUDIES
 
 @judges("F15A", figure="15A", needs=("isolator-masses",))
 def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
-    """Judge which cells behave differently from the marker."""
+    """Judge whether nearly all pairs of masses behave as the thesis's evaluation point does."""
     words = reading()
     cart, stage, moving, valid = verdict_table(evidence.maps["isolator-masses"], "masses.cart", "masses.stage")
     marker = STUDIES["isolator-masses"].marker
@@ -38,7 +38,7 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
 
 @judges("F15B", figure="15B", needs=("isolator-friction", "friction"))
 def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
-    """Judge the cells that keep moving with the isolator, and with the joint locked."""
+    """Judge whether the isolated rig comes to rest for nearly all pairs of friction forces."""
     words = reading()
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["isolator-friction"]

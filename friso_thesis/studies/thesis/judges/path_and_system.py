@@ -32,7 +32,7 @@ TRAVEL = 0.16
 
 @judges("F11A", figure="11A", needs=("path",))
 def path_is_no_cure(evidence: Evidence) -> Finding:
-    """Judge whether scattered cells settle only below a hyperbola of acceleration and its time."""
+    """Judge whether any path ends hunting, over acceleration and acceleration time."""
     words = reading()
     acceleration, time, moving, valid = verdict_table(
         evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"
@@ -79,7 +79,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
-    """Judge the highest crossover that keeps moving, over all masses and for each."""
+    """Judge the highest crossover at which the stage keeps moving, over all masses and for each."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -113,7 +113,7 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
 def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
     """Say how many cells keep moving at the highest crossover at which any does.
 
-    The text also gives their numbers of peaks.
+    The text also gives the largest number of peaks counted in them.
     """
     rows = np.flatnonzero(moving.any(axis=1))
     if not rows.size:

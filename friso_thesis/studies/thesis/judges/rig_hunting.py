@@ -38,7 +38,10 @@ def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
 
 
 def _beside(counted: tuple[int, int], threshold: float) -> str:
-    """Return that a fraction of rails is undecided if its interval holds the threshold, else ""."""
+    """Say that a count of rails is too near a `threshold` to decide; "" if it decides.
+
+    It is too near if the interval of the fraction holds the threshold.
+    """
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""
 
@@ -51,12 +54,12 @@ def _rails(counted: tuple[int, int]) -> str:
 
 @judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
 def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
-    """Judge the move at 8 Hz."""
+    """Judge whether the rig hunts after the move at 8 Hz if locked, and settles if free."""
     return judged_move(evidence.experiments.moves)
 
 
 def judged_move(moves: MovesOnRails) -> Finding:
-    """Judge moves on several rails."""
+    """Judge on how many rails peaks are counted after the move, joint locked and joint free."""
     words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
@@ -75,12 +78,12 @@ def judged_move(moves: MovesOnRails) -> Finding:
 
 @judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
 def locked_needs_crossover(evidence: Evidence) -> Finding:
-    """Judge the move at the crossovers of Fig. 25, and releases at the middle one."""
+    """Judge which crossover the locked rig needs, by the move of Fig. 25 and by releases."""
     return judged_crossovers(evidence.experiments.moves)
 
 
 def judged_crossovers(moves: MovesOnRails) -> Finding:
-    """Judge moves and releases with the joint locked."""
+    """Judge at which crossovers peaks are counted after moves and releases, joint locked."""
     low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
     words, quiet = reading(), (middle[1] - middle[0], middle[1])
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
@@ -116,7 +119,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
 
 @judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
-    """Judge the fraction of rails over stroke and crossover."""
+    """Judge whether more stroke needs less crossover, by the rails with counted peaks."""
     return judged_grid(evidence.experiments.grid)
 
 
@@ -150,12 +153,12 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
 
 @judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
 def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
-    """Judge the cycle on an even rail against cycles on rails that vary."""
+    """Judge whether cycles on rails that vary are slower than the cycle on an even rail."""
     return judged_cycles(evidence.experiments.cycles)
 
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
-    """Judge cycles on an even rail, as the thesis simulates, and on rails that vary."""
+    """Judge the cycle on an even rail, as the thesis simulates, and those on varied rails."""
     words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
@@ -227,12 +230,12 @@ _COMPARED = ("period", "swing")
 
 @judges("F28", figure="28", needs=(STANDSTILL,))
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
-    """Judge the standstill with the joint locked and free, and with more damping."""
+    """Judge whether the rig stands less still with its joint free, and what damping recovers."""
     return judged_standstill(evidence.experiments.standstill)
 
 
 def judged_standstill(standstill: InPosition) -> Finding:
-    """Judge standstills."""
+    """Judge whether the stage stands less still with its joint free, and what damping recovers."""
     words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
@@ -276,7 +279,7 @@ def _sized(peaks: tuple[float, float]) -> bool:
 
 
 def _over_noise(standstill: InPosition) -> str:
-    """Say at which force noises the deviations are as measured."""
+    """Say with which noises of the force the deviations at standstill are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:

@@ -102,7 +102,10 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
 
 
 def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
-    """Judge whether a weaker motor shows the mass `seen` [kg]; `joint` is 0 locked, 1 free."""
+    """Judge whether a weaker motor brings the apparent mass nearer `seen` than `weighed` [kg].
+
+    `joint` is 0 for locked, 1 for free.
+    """
     plain, weak, strong = loops.apparent[joint]
     part = Part(
         f"with a motor that gives {RATIOS[1]:g} of the force that the drive assumes, it is nearer {seen:g} than the "

@@ -1,4 +1,7 @@
-"""Judge Fig. 13: the force's shares while the stage sticks, at two friction gaps."""
+"""Judge Fig. 13: the terms of the force while the stage sticks, at two friction gaps.
+
+The gap is static minus Coulomb friction.
+"""
 
 from __future__ import annotations
 
@@ -29,10 +32,10 @@ TURNING = 0.05
 
 @dataclass(frozen=True)
 class Sticking:
-    """The sticks that end in break-away, each array of shape (sticks,).
+    """The times during which the stage sticks before it breaks away, arrays of shape (sticks,).
 
-    A stick has a length [s], the fraction of the integral action in the force at break-away, and the direction of
-    break-away (1 or -1).
+    `time` [s] is how long it sticks, `integral` the fraction of the integral action in the force at break-away, and
+    `direction` that of break-away (1 or -1).
     """
 
     time: np.ndarray
@@ -65,7 +68,7 @@ class Sticking:
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
-    """Judge sticking time, and fraction of the integral action at break-away, at both gaps."""
+    """Judge for how long the stage sticks at both gaps, and the integral's part in the force."""
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     why = (
         ""
@@ -93,7 +96,7 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
 
 
 def sticking(response: Response) -> Sticking:
-    """Return a response's sticks that end in break-away, after the start of peak counting.
+    """Return when the stage sticks and then breaks away, after peaks begin to count.
 
     A stick begins where the cart falls below the Stribeck velocity and ends where it exceeds it. The fraction of the
     integral action is taken where the friction force is largest within the stick, before it drops.

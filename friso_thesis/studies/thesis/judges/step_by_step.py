@@ -118,7 +118,7 @@ def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
 
 @judges("S41A", figure="Sec. 4.1, alpha and break-away", needs=(LOW_ALPHA, HIGH_ALPHA))
 def larger_alpha_breaks_away_sooner(evidence: Evidence) -> Finding:
-    """Judge the sticks at both ends of the range of alpha."""
+    """Judge for how long the stage sticks at both ends of the range of alpha."""
     low, high = (cycle_of(evidence.responses[name]).stick for name in (LOW_ALPHA, HIGH_ALPHA))
     undecided = "" if low.both and high.both else NOTHING_TO_COMPARE
     return Finding(
@@ -149,7 +149,7 @@ def _seconds(time: float) -> str:
 
 @judges("F25R", figure="25", needs=("system",), of_runs=True)
 def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
-    """Judge the period of lasting cycles over the crossover, at every mass of the map."""
+    """Judge whether lasting cycles become faster as the crossover rises, on average over masses."""
     words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
@@ -173,7 +173,7 @@ def response_time_falls_with_crossover(evidence: Evidence) -> Finding:
 
 @judges("S5P", figure="Sec. 5, peaks and cycles", needs=_ISOLATED, of_runs=True)
 def more_peaks_than_cycles(evidence: Evidence) -> Finding:
-    """Judge the isolated runs that swing to their end with more counted peaks than cycles."""
+    """Judge whether some isolated runs that swing to their end count more peaks than cycles."""
     swinging, more = 0, 0
     for name in _ISOLATED:
         runs = evidence.maps[name]

@@ -67,7 +67,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """Judge the cells of stroke 0 against the locked rig."""
+    """Judge whether the cells of stroke 0 behave as the locked rig does."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["count"].values
@@ -125,9 +125,9 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
 
 
 def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
-    """Say where runs keep moving in a stripe of their own.
+    """Say at which longer strokes runs keep moving again, if they do: a stripe of its own.
 
-    Its strokes are longer than some at which all runs come to rest. `moving` has the shape (strokes, dampings).
+    At some shorter strokes all these runs come to rest. `moving` has the shape (strokes, dampings).
     """
     rests = np.maximum.accumulate(~moving, axis=0)  # the first stroke at which they come to rest
     apart = moving & rests

@@ -40,7 +40,7 @@ PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locke
 class PartNeeded:
     """A part of the analysis that a judge may name.
 
-    `outside` are the tables of the stage file that do not matter for it. `locked` tells whether its joint is locked, so
+    `outside` are the tables of the stage file that do not matter for it. `locked` is true if its joint is locked, so
     that the joint's own damping does not matter.
     """
 

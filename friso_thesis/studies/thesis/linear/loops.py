@@ -98,8 +98,8 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 def _single(flat: Mapping[str, Any]) -> float | None:
     """Return the highest crossover [Hz] up to which the sliding loop crosses 0 dB once.
 
-    A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if the
-    search ends first, and 0 if there is no such crossover.
+    A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if that
+    holds up to the end of the search, and 0 if at no crossover.
     """
     settings = FrequencySettings.current()
     cases = limit_cases(flat)
@@ -119,7 +119,7 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 def _highest(flat: Mapping[str, Any]) -> float | None:
     """Return the crossover [Hz] up to which all limit cases are stable.
 
-    The result is None at the end of the search, and 0 if there is none.
+    The result is None if they are stable up to the end of the search, and 0 if at no crossover.
     """
     ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0

@@ -85,8 +85,8 @@ def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
 def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: float) -> np.ndarray:
     """Return the real part [1/s] of the loop's rightmost pole, at speeds (n,) [m/s].
 
-    Friction is linearised at these speeds, with the bristles at a fraction of the deflection that belongs to the speed
-    in steady state.
+    Friction is linearised at these speeds. The bristles are deflected by the fraction `share` of what belongs to the
+    speed in steady state.
     """
     law = law_of(flat)
     assert law is not None  # the rig has friction

@@ -30,7 +30,7 @@ LITTLE = "1 N*s/m"
 
 @dataclass(frozen=True)
 class Contact:
-    """A contact of cart and stage so soft that its mode lies at the further crossing.
+    """A contact of cart and stage so soft that its mode lies at a further crossing of 0 dB.
 
     That crossing was measured. The contact has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop,
     locked at the highest setting, with the rig's limiter damping; `undamped` are those with little damping.
