@@ -70,9 +70,10 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
 
 
 def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
-    """Return independent standard normal numbers of cells, from number `first`.
+    """Return standard normal numbers for `count` cells of the rail, from number `first` on.
 
-    Each is a function of the cell's number alone.
+    The numbers are independent, and each is a function of the cell's number and the seed alone. Raises InputError for
+    too many cells.
     """
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS

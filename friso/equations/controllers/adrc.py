@@ -115,7 +115,7 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the observer, then the feedback of its states."""
+        """Draw the controller: a box for the observer, then one for the feedback of its states."""
         canvas.box("observer: e1, e2, e3")
         canvas.box("m (w_c^2 e1 + 2 w_c e2 + e3)")
 
@@ -142,7 +142,7 @@ class DisturbanceRejection(ControllerSection):
 
 
 def crossing_ratio(observer_ratio: float) -> float:
-    """Return the 0 dB crossover of the loop over `bandwidth`, for a free mass that is known.
+    """Return the loop's 0 dB crossover over `bandwidth`, for a free mass of the assumed size.
 
     It depends only on the ratio of observer to feedback.
 
