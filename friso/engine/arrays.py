@@ -11,8 +11,9 @@ import numpy as np
 class Tables(NamedTuple):
     """Tables that a drive with a clock looks up, evenly spaced.
 
-    Tables over position have the shape (runs or 1, tables, points), with their first place and points per metre (runs
-    or 1, 2). Tables over time have that shape too, with their points per second (1,).
+    `places` are tables over position, shape (runs or 1, tables, points); `grid` has their first position and points per
+    metre, (runs or 1, 2). `times` are tables over time, also (runs or 1, tables, points), with their points
+    `per_second`, (1,).
     """
 
     places: np.ndarray
@@ -69,10 +70,11 @@ class BatchOptions(NamedTuple):
 
 
 class Results(NamedTuple):
-    """Outputs of the runs of a batch.
+    """Outputs of the n runs of a batch.
 
-    They are statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,), sampled
-    states with the held numbers (n, samples, states + held), and states with held numbers at the end of the run.
+    They are statistics (n, len(STATISTICS)), status (n,), and turning points (n, capacity) with their count (n,).
+    Samples hold states and the numbers held between samples, (n, samples, states + held); `ends` hold both at the end
+    of the run.
     """
 
     statistics: np.ndarray

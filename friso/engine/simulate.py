@@ -61,7 +61,10 @@ def checked_interval(interval: float, duration: float) -> float:
 
 
 def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
-    """Return the model's outputs from its states, shape (states, samples), at the times [s]."""
+    """Return the model's outputs, such as forces, at times [s], each of shape (samples,).
+
+    They are computed from states, shape (states, samples). `flat` has the stage's keys in SI.
+    """
     parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
     rows = motion.pieces(flat, 1)[0]
     active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
@@ -72,9 +75,9 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
-    """Return the model's outputs as variables over "time".
+    """Return the model's outputs, such as forces, as variables over "time", with their units.
 
-    They are computed from states, shape (states, samples), at the times [s].
+    They are computed from states, shape (states, samples), at the times [s]. `flat` has the stage's keys in SI.
     """
     arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {

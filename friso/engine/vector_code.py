@@ -1,8 +1,8 @@
-"""Write straight-line Python, made for one lane, as vector instructions for all lanes.
+"""Compile straight-line Python, written for one run, for several runs at once.
 
 The step of a model is a thousand lines without a branch. A general compiler would infer the type of every variable in
-them, and find out that the lanes do not depend on each other. Here each operation becomes one instruction on a vector
-with an element per lane. This takes a fraction of the time, and does not rely on a vectoriser.
+them, and find out that runs do not depend on each other. Here each operation becomes one instruction on a vector, which
+has a number of each run in its lane. This takes a fraction of the time, and does not rely on a vectoriser.
 
 The language has assignments, arithmetic, comparisons and tuples. It also has conditional expressions, both sides of
 which are computed, and `for` over a known range. Functions written in it are inlined.
@@ -105,7 +105,7 @@ class _Vector:
 
 @dataclass(frozen=True)
 class _Column:
-    """The rows of a buffer."""
+    """The rows of the buffer, each with a number in every lane."""
 
     builder: Any
     data: ir.Value
@@ -125,7 +125,7 @@ class _Column:
 
 
 class _Writer:
-    """Writer of the instructions of functions."""
+    """Writer of the LLVM instructions of functions, for several lanes."""
 
     def __init__(self, builder: Any, lanes: int) -> None:
         self.builder, self.lanes = builder, lanes

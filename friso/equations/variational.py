@@ -56,13 +56,16 @@ Small = Mapping[sp.Symbol, sp.Symbol]
 
 
 def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
-    """Return the directional derivative of an expression along the deviation."""
+    """Return how much an expression changes with a small deviation.
+
+    `small` maps each symbol to the symbol of its deviation.
+    """
     terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
     return sum(terms, start=sp.S.Zero)
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink.
+    """Return the jump of deviations at a kink, where derivatives jump.
 
     It is (f+ - f-) times the component of the deviation across the kink, divided by the speed of crossing.
     """
@@ -80,9 +83,10 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink where states become R(x).
+    """Return the jump of deviations at a kink where states become R(x), by deviation.
 
-    It is DR small + (f+ - DR f-) share, with f+ taken at R(x).
+    It is DR small + (f+ - DR f-) share - small, with f+ taken at R(x). `share` is the time by which the neighbouring
+    motion crosses earlier or later.
     """
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
