@@ -1,1 +1,1 @@
-"""Turn equations into numbers: compiled code, cached on disk, that runs several stages at once."""
+"""Turn equations into numbers: compiled code, cached on disk, for several runs at once."""

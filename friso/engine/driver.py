@@ -343,7 +343,7 @@ def load_run(B, layout, lane, j, batch, settings):
 
 
 def start_clock(B, layout, lane, j, batch):
-    """Let the drive of run `j` take its first sample; its results act at once or after the delay."""
+    """Let the drive of run `j` take its first sample, with results at once or after the delay."""
     late, tables = batch.clocks[j, 1], batch.tables
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late

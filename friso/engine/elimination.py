@@ -17,7 +17,7 @@ MULTIPLY, DIVIDE = 4, 13
 """Latency of a fused multiply-add and of a division, in cycles, on current x86-64 processors."""
 
 WORK = 0.5
-"""Processor clocks of a vector operation that nothing waits for; two units work side by side."""
+"""Processor clocks of a vector operation that nothing waits for; two work side by side."""
 
 
 @dataclass(frozen=True)

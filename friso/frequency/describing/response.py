@@ -80,7 +80,7 @@ def plant_response(
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """Return the columns for every root, with units and text."""
+    """Return the quantities of every root, by name, with units and text."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
@@ -97,9 +97,9 @@ def _words(unit: str, text: str) -> dict[str, str]:
 
 
 def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return the indices of every root, and the number of roots in each cell.
+    """Return where every root belongs, and the number of roots for each force and frequency.
 
-    Indices are force, frequency, and rank by rising amplitude.
+    The places are indices of force, frequency, and rank by rising amplitude.
     """
     cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])
@@ -110,7 +110,10 @@ def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.nd
 
 
 def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int, int]) -> np.ndarray:
-    """Return the roots' values in an array over force, frequency and branch."""
+    """Spread the roots' values over an array of force, frequency and branch, NaN elsewhere.
+
+    `place` has the indices of each root.
+    """
     array = np.full((*shape, int(place[2].max(initial=0)) + 1), np.nan, values.dtype)
     array[place] = values
     return array
@@ -127,10 +130,10 @@ def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
 
 
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
-    """Return the branch that an analyser shows at every frequency, (forces, frequencies).
+    """Return the number of the branch that an analyser shows at every frequency.
 
-    It steps up (order 1) or down (-1), and shows the stable branch nearest in amplitude to the previous one; at the
-    start, the smallest.
+    The shape is (forces, frequencies). It steps up (`order` 1) or down (-1), and shows the stable branch nearest in
+    amplitude to the previous one; at the start, the smallest.
     """
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)
