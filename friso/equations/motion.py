@@ -13,7 +13,7 @@ from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
 
 
 def form_of(flat: Mapping[str, Any]) -> ReferenceForm:
-    """Return of what a stage's reference consists: polynomials of a degree, and sinusoids."""
+    """Return what a stage's reference consists of: polynomials of a degree, and sinusoids."""
     return motion_of(flat).form(flat)
 
 

@@ -197,7 +197,7 @@ class MoveProfile(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Say of what the reference consists: polynomials whose degree is the number of limits."""
+        """Say what the reference consists of: polynomials whose degree is the number of limits."""
         return ReferenceForm(len(_limits(flat)))
 
     @staticmethod
