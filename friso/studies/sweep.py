@@ -80,7 +80,7 @@ def run_in_memory(
 ) -> list[xr.Dataset]:
     """Run studies side by side, verify a fraction of each, and return them as datasets.
 
-    Refined studies are run one by one.
+    `verify` is that fraction of cells. Refined studies are run one by one.
     """
     tally = Tally(progress, sum(study.cells for study in studies))
     refined = {id(study): _refined(study, crew, tally) for study in studies if study.refined}
@@ -100,16 +100,20 @@ def run_in_memory(
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of a study's store, verify a fraction, and return the opened store.
+    """Run the missing blocks of a study's store, and return the study as it is opened.
 
-    The store is created if necessary. Raises InputError.
+    The store at `path` is created if necessary. `verify` is the fraction of cells to run again at a tighter tolerance.
+    Raises InputError for a folder that cannot be this store.
     """
     with Store.opened(path, study) as store:
         return fill(store, crew, verify, progress)
 
 
 def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of an opened store, verify a fraction, and return its dataset."""
+    """Run the missing blocks of an opened store, and return its study.
+
+    `verify` is the fraction of cells to run again at a tighter tolerance.
+    """
     study, missing = store.study, list(store.missing())
     tally = Tally(progress, study.cells)
     tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
@@ -129,9 +133,9 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
 
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
-    """Return the measures of a refined study, each of its shape.
+    """Return the metrics of a refined study, each of its shape.
 
-    `keeping` may keep the answers of a resumed study.
+    `keeping` changes the function that computes cells, to store the results of an unfinished study.
     """
     everything = asked_for(study)
 
@@ -145,7 +149,7 @@ def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], As
 
 
 def dataset(study: Study, columns: Columns) -> xr.Dataset:
-    """Return the dataset of a study from its measures, each of the study's shape."""
+    """Return the dataset of a study from its metrics, each of the study's shape."""
     import xarray as xr
 
     variables = {
