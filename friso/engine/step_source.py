@@ -162,7 +162,7 @@ class StepWriter:
     def source(self) -> str:
         """Write the function `step(B, rtol, inner, outer, budget)` for one run.
 
-        It tells whether something happened in the step that the loops around it must record.
+        It returns true if something happened in the step that the loops around it must record.
         """
         body = [
             *self._load(),

@@ -1,7 +1,7 @@
 """Define the building blocks of the model in SymPy symbols: states, kinks and outputs.
 
-A parameter is a symbol named after its stage-file key. So its value is looked up in the flat stage, and a derivative
-with respect to it is a sensitivity to that key.
+A parameter is a symbol named after its stage-file key. So its value is looked up among the stage's keys, and a
+derivative with respect to it is a sensitivity to that key.
 """
 
 from __future__ import annotations

@@ -22,9 +22,10 @@ from friso.stage.transmission import moving_mass
 FlatMachine = Mapping[str, Any]
 Sizes = Callable[[FlatMachine, float], dict[str, float]]
 Ranges = Callable[[FlatMachine, float], dict[str, tuple[float, float]]]
-"""Function of a stage's flat keys and the position tolerance [m].
+"""Function of a stage's keys in SI and the position tolerance [m].
 
-It returns values [SI], or ends of ranges, by name in the table [controller]."""
+It returns values [SI], or ends of ranges, by name in the table [controller].
+"""
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
 """Ranges of the integral limit, relative to break-away friction, and of the leak, relative to the bandwidth.

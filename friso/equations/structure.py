@@ -159,7 +159,10 @@ def structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def carrying_force(flat: Mapping[str, Any]) -> Any:
-    """Return the force [N] of the actuator that carries the constant forces of [bias], as of a vertical axis."""
+    """Return the actuator force [N] that carries the constant forces of [bias].
+
+    A vertical axis, for example, has such forces.
+    """
     return 0.0 - sum(np.asarray(flat.get(f"bias.{name}", 0.0)) for name in ("cart", "stage"))
 
 
@@ -188,7 +191,7 @@ def _joint_form(flat: Mapping[str, Any]) -> JointForm:
 
 
 def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
-    """Return the structure of a stage's transmission from its flat keys."""
+    """Return the structure of a stage's transmission; `flat` has the stage's keys in SI."""
     at_motor = {"friction.model": "none", **as_friction(flat)}
     law = at_motor["friction.model"]
     return TransmissionForm(

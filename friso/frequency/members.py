@@ -23,8 +23,8 @@ BIASES, SPEEDS = 65, 257
 class Members:
     """States of a stage, one per row, each array of shape (members,).
 
-    `speed` [m/s] of the cart, 0 where it is stuck; `bias` [N], the friction force of a stuck cart, positive where it
-    opposes the motion; `touched`, whether the limiter is; `forward`, the direction of the motion.
+    `speed` [m/s] is that of the cart, 0 where it is stuck. `bias` [N] is the friction force of a stuck cart, positive
+    where it opposes the motion. `touched` is true if the limiter is touched, and `forward` for motion ahead.
 
     Examples
     --------

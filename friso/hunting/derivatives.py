@@ -20,8 +20,8 @@ from friso.hunting.settings import EdgeSettings
 class CycleDerivatives:
     """The limit cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
 
-    It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` tells
-    whether it is stable; `amplitude` [m] and `period` [s] are its size.
+    It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` is true if
+    it is stable; `amplitude` [m] and `period` [s] are its size.
     """
 
     attracts: bool

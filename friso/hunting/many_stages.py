@@ -105,7 +105,8 @@ def find_attractors(
 
     `flat` has the stages' keys in SI. Stages whose references never stand still cannot hunt. Orbits are closed to the
     relative tolerance. Without `close_orbits`, only simulations are used, and motions that have converged count as
-    attracted. `threads` and `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work is used up.
+    attracted. `threads` bounds the threads of runs, and setting `cancel` stops them. Raises Exhausted if an allowance
+    of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
@@ -119,8 +120,8 @@ def sketch_attractors(
     """Sketch the attractors of stages of one structure by coarse return maps.
 
     Where these maps are not reliable, stages are simulated. A sketch is faster than `find_attractors`, and may miss an
-    attractor with a narrow basin. `threads` and `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work
-    is used up.
+    attractor with a narrow basin. `threads` bounds the threads of runs, and setting `cancel` stops them. Raises
+    Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -169,8 +170,8 @@ def judge_runs(
     """Judge stages from motions and attractors that are already computed.
 
     Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion was not
-    completed, or if it is not certain what attracts it. `rtol` is the relative tolerance of further runs; `threads` and
-    `cancel` as in `RunOptions`.
+    completed, or if it is not certain what attracts it. `rtol` is the relative tolerance of further runs. `threads`
+    bounds the threads of runs, and setting `cancel` stops them.
     """
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))

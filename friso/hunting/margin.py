@@ -86,7 +86,7 @@ def find_margin(stage: Stage, attracting: bool) -> Margin | None:
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
     """Search the bandwidths of `SEARCH_LIMITS` for attractors of a stage.
 
-    `attracting` tells whether something attracts the stage itself, and `survey` is its survey, if there was one. If an
+    `attracting` is true if something attracts the stage itself, and `survey` is its survey, if there was one. If an
     allowance of work is used up, the ends are as good as they were by then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())

@@ -81,7 +81,8 @@ class Measures:
 def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
     """Return the options for runs that are to be measured, with the relative tolerance `rtol`.
 
-    `threads` and `cancel` as in `RunOptions`. Turning points are kept from a little before the first that may count.
+    `threads` bounds the threads of runs, and setting `cancel` stops them. Turning points are kept from a little before
+    the first that may count.
     """
     return RunOptions(
         rtol=rtol,

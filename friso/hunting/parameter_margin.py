@@ -75,10 +75,10 @@ class ParameterMargin:
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
     """Find over what range of a parameter a stage keeps hunting, or keeps not hunting.
 
-    The search runs from the factor `lowest` to the `highest` one; `scaled` makes the stages, and `attracts` tells
-    whether the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows outward, then more
-    closely around a change. Both ends are searched thoroughly. Ranges narrower than these steps may be missed. A side
-    is open if an allowance of work is used up, or the search does not decide.
+    The search runs from the factor `lowest` to the `highest` one. `scaled` makes the stages, and `attracts` is true if
+    the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows outward, then more closely
+    around a change. Both ends are searched thoroughly. Ranges narrower than these steps may be missed. A side is open
+    if an allowance of work is used up, or the search does not decide.
     """
     settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}

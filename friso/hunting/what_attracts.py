@@ -137,7 +137,7 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 class Sketch:
     """Result of coarse return maps of stages, arrays of shape (count,).
 
-    `attracts` tells whether a stage seems to have an attractor, `decided` whether the map decides that.
+    `attracts` is true if a stage seems to have an attractor, and `decided` if the map decides that.
     """
 
     attracts: np.ndarray

@@ -12,7 +12,7 @@ from friso.quantities import Quantity, positive
 from friso.stage.section import UncertainSection, Variants
 
 KIND, DURATION = "motion.kind", "motion.duration"
-"""Flat keys of every motion."""
+"""Keys that every motion has."""
 
 
 class ReferenceForm(NamedTuple):

@@ -149,7 +149,7 @@ def _number(value: Any) -> float | None:
 def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
     """Read a range of an axis, such as "1 Hz..40 Hz:41", into its ends, count and spacing.
 
-    With `log` the spacing is logarithmic unless the text states it. Raises InputError for a range that is no range.
+    With `log` the spacing is logarithmic unless the text states it. Raises InputError for a text that is no range.
     """
     match = _RANGE.fullmatch(text)
     if match is None:

@@ -1,6 +1,6 @@
 """Run cells: stages that differ in some keys.
 
-Columns of values become columns of measures.
+Values of keys go in as columns, and metrics come out as columns, with one entry per cell.
 """
 
 from __future__ import annotations

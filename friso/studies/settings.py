@@ -30,10 +30,8 @@ class StudySettings(Settings):
     """Hunting amplitude of the template's stage with its joint locked (docs/hunting.md)."""
 
     swing_error: float = setting(0.02, "")
-    """Largest relative error of the expected amplitude.
-
-    Processors agree to a thousandth; a broken kernel is off by far more.
-    """
+    """Largest relative error of the expected amplitude. Processors agree to a thousandth; a broken kernel is off by far
+    more."""
 
     stages_together: int = setting(256, "")
     """Stages computed between progress reports. Fewer do not fill the processor's registers."""
@@ -45,10 +43,8 @@ class StudySettings(Settings):
     """Default draws. They give a fraction to five percent; more make a check wait."""
 
     usual_work: float = setting(3e8, "")
-    """Work of a check without a requested number of draws (see `friso.engine.allowance`).
-
-    It takes about 4 s on one core.
-    """
+    """Work of a check without a requested number of draws (see `friso.engine.allowance`). It takes about 4 s on one
+    core."""
 
     draws_of_a_swing: int = setting(64, "")
     """Draws whose amplitude and period are reported. A range of fewer leaves a tenth of the machines out."""
@@ -69,10 +65,8 @@ class StudySettings(Settings):
     """Largest block in memory [cells]. It fills the processor's registers nearly to its end."""
 
     largest_survey_block: int = setting(256, "")
-    """Largest block of a survey [cells], which needs a hundred runs for each cell.
-
-    Larger ones report progress too rarely.
-    """
+    """Largest block of a survey [cells], which needs a hundred runs for each cell. Larger ones report progress too
+    rarely."""
 
     look_interval: float = setting(0.05, "s")
     """Interval between checks for cancellation. Longer ones are felt after Ctrl-C."""
@@ -117,10 +111,8 @@ class StudySettings(Settings):
     """Friction that a curve must reach, relative to static friction, to show break-away."""
 
     late_points: int = setting(20, "")
-    """Share of points, one in so many, whose mean must nearly reach static friction.
-
-    A single outlier then does not count.
-    """
+    """Share of points, one in so many, whose mean must nearly reach static friction. A single outlier then does not
+    count."""
 
     backward_share: float = setting(0.01, "")
     """Largest backward displacement that is noise, not a turn."""
@@ -147,16 +139,11 @@ class StudySettings(Settings):
     """Fraction of the fine grid of a map that is run. Fewer runs may step over small islands."""
 
     lattice_step: int = setting(8, "")
-    """Spacing of the first runs in the fine grid [cells].
-
-    A smaller one leaves fewer runs for the boundary.
-    """
+    """Spacing of the first runs in the fine grid [cells]. A smaller one leaves fewer runs for the boundary."""
 
     refine_batches: int = setting(100, "")
-    """Batches of runs of a refined map, each chosen after the results of the one before.
-
-    More wait for their slowest cell.
-    """
+    """Batches of runs of a refined map, each chosen after the results of the one before. More wait for their slowest
+    cell."""
 
     late_settling: float = setting(10.0, "s")
     """Time after which the thesis counts peaks. A run that settles so late counts as swinging."""
@@ -186,10 +173,7 @@ class StudySettings(Settings):
     """Traces computed together, some tens of megabytes."""
 
     tighter_factor: float = setting(100.0, "")
-    """Factor by which verification tightens the tolerance.
-
-    A smaller one leaves similar errors in both runs.
-    """
+    """Factor by which verification tightens the tolerance. A smaller one leaves similar errors in both runs."""
 
     least_verified: int = setting(50, "")
     """Fewest verified cells for a meaningful fraction."""

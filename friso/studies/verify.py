@@ -133,7 +133,7 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
 
 
 def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
-    """Return for each cell "run" if it ran to its end, `INFERRED` if so, or "" for neither."""
+    """Return for each cell "run" if it ran to its end, `INFERRED` if it was inferred, else ""."""
     status, outcome = (_at(runs[name], study, cells).astype(str) for name in ("status", "outcome"))
     kinds = np.where(np.isin(outcome, ["invalid", "failed", ""]), "", "run")
     return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

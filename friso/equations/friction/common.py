@@ -141,7 +141,7 @@ class StribeckCurve(NamedTuple):
     """Choices that decide the equations of a Stribeck curve.
 
     `exponent` is given if it is a small whole number, and its powers are then written as products; otherwise it is
-    None. The other fields tell whether levels and viscous friction differ between directions, and whether [conditions]
+    None. The other fields are true if levels, or viscous friction, differ between directions, and if [conditions]
     multiply the levels.
     """
 

@@ -62,16 +62,21 @@ def describing(
 ) -> xr.Dataset:
     """Describing function of the stage's friction, over amplitude [m] and frequency [Hz].
 
-    Variables over ("amplitude", "frequency"): `stiffness`, N = F_1/A [N/m], complex; `work` [J], what friction takes
-    out of the motion in a period; `gap`, by how much the law's own states miss themselves after a period, as a share
-    of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
-    harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
-    itself; the others come from `samples` samples of the period, whose accuracy `aliasing` estimates: by how much the
-    first harmonic from the samples differs from the integrated one, as a fraction of it (NaN if nothing was sampled,
-    which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
+    Variables over ("amplitude", "frequency"):
 
-    Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics, samples or an `rtol` that
-    are not usable. A pair that fails has NaN and a reason in `status`.
+    - `stiffness`: N = F_1/A [N/m], complex.
+    - `work` [J]: what friction takes out of the motion in a period.
+    - `gap`: how far the friction law's own states are from where they began, after a period, relative to their scales.
+    - `aliasing`: error of the harmonics from samples. It is the relative difference of the first harmonic from samples
+      to the integrated one, NaN if nothing was sampled.
+    - `status`: "done", or the reason why a pair of amplitude and frequency failed; its numbers are NaN then.
+
+    The variable `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the harmonics from the mean F_0
+    to F_`harmonics`. The solver integrates the first one itself; the others come from `samples` samples of the period.
+    With `harmonics` = 1 nothing is sampled, and F_0 is NaN unless the law is symmetric.
+
+    Raises InputError for a stage without friction, and for amplitudes, frequencies, harmonics, samples or an `rtol`
+    that are not usable.
 
     Examples
     --------

@@ -37,16 +37,24 @@ def plant_response(
 ) -> xr.Dataset:
     """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 
-    Variables over ("force", "frequency", "branch"), by rising amplitude, NaN where there are fewer: `response`, stage
-    position over force [m/N], complex; `cart_response` [m/N]; `amplitude` of the cart [m]; `stiffness` of friction
-    [N/m]; `lasting`, whether the force rises with the amplitude (1, 0, or NaN); `error`, relative, of the force. Over
-    ("force", "frequency"): `up` and `down`, the response [m/N] that an analyser shows which starts at rest at the
-    lowest, or highest, frequency, and steps to the others in turn: of the lasting branches the one nearest in amplitude
-    to that before, NaN where none lasts; `answers`, their number; `status`, also of forces and frequencies that are
-    beyond what can be computed. The answers to one force do not depend on what else is asked for.
+    A force may have several answers, or branches. Variables over ("force", "frequency", "branch") are in order of
+    rising amplitude, NaN where there are fewer branches:
 
-    Raises InputError for forces or frequencies that are not usable and for a stage without friction, and for an
-    `rtol` that is not usable.
+    - `response`: stage position over force [m/N], complex; `cart_response` [m/N]: that of the cart.
+    - `amplitude` [m] of the cart, and `stiffness` of friction [N/m], complex.
+    - `lasting`: 1 if the force rises with the amplitude, so that the branch is stable, 0 if it falls, else NaN.
+    - `error`: relative error of the force.
+
+    Variables over ("force", "frequency"):
+
+    - `up` and `down`: the response [m/N] that an analyser shows. It starts at rest at the lowest (or highest)
+      frequency, and steps to the others in turn. Of the lasting branches it shows the one nearest in amplitude to the
+      branch before, NaN where none lasts.
+    - `answers`: the number of branches.
+    - `status`: what is wrong, also with forces and frequencies that are beyond what can be computed, or "done".
+
+    The answers to one force do not depend on the other forces. Raises InputError for a stage without friction, and for
+    forces, frequencies or an `rtol` that are not usable.
 
     Examples
     --------

@@ -168,7 +168,7 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
 
 
 def _try_memories(begun: Starts, survey: Survey) -> None:
-    """Survey stages without an attractor so far from starts with bristles bent by various pasts."""
+    """Survey stages that have no attractor yet, from starts with bristles bent by past motion."""
     left = np.flatnonzero(~survey.attracted)
     if left.size:
         starts = begun.take(left)
@@ -178,7 +178,7 @@ def _try_memories(begun: Starts, survey: Survey) -> None:
 
 
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
-    """Survey stages that still have no attractor from the cycles that the return map suggests.
+    """Survey stages that have no attractor yet, from cycles that the return map suggests.
 
     Near a fold the basin of a stable cycle is narrower than the spacing of the usual starts.
     """

@@ -69,7 +69,7 @@ _Kind = tuple[int, float, float]
 class _Beside(ArrayRows):
     """Unstable cycles that runs resemble, arrays of shape (runs,).
 
-    `cycles` are the numbers of the cycles (-1: none). `offsets` tell how much farther each run swings than its cycle,
+    `cycles` are the numbers of the cycles (-1: none). `offsets` are how much farther each run swings than its cycle,
     relative to the cycle (0 without a cycle).
     """
 
@@ -98,7 +98,7 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Return which runs have period and size of one of some motions, `kinds`, shape (runs,).
+    """Return which runs have the period and size of one of the motions `kinds`, shape (runs,).
 
     `owners`, shape (runs,), are the numbers of the runs' stages.
     """

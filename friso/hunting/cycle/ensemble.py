@@ -219,12 +219,12 @@ class Ensemble:
         along: tuple[str, ...] = (),
         **run_options: Any,
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`.
+        """Run each stage from its state in `starts` for its duration [s].
 
         A run begins in the switched modes that belong to its state. The `ends` of the result are states alone, or with
         the modes if `with_modes`. With `variational`, deviations from the run are integrated too; they may be `along`
-        keys (see `KernelRequest`), by the values of the flat keys. Turning points are kept only with `least_swing`,
-        because a limiter that chatters makes too many.
+        keys (see `KernelRequest`), by the values of the stage's keys. Turning points are kept only with `least_swing`,
+        because a limiter that chatters makes too many. `run_options` are fields of `RunOptions`.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)

@@ -40,8 +40,8 @@ class Orbits(ArrayRows):
 
     `states` (count, states) has one state of each orbit. `times` [s] (count,) is the time after which the orbit returns
     to that state, or to its mirror image if `sign` is -1. `gaps` (count,) is the remaining error relative to the
-    states' magnitudes. `closed` (count,) tells whether Newton's method converged. `swings` counts swings in that time:
-    one in half a period of the simplest cycles, two in a whole one.
+    states' magnitudes. `closed` (count,) is true if Newton's method converged. `swings` counts swings in that time: one
+    in half a period of the simplest cycles, two in a whole one.
     """
 
     states: np.ndarray
@@ -146,7 +146,8 @@ def close_along(
     The orbits start from `states` and `times` [s], and their stages from `places` on the lines. The method passes
     folds, where no orbit exists at a place beyond. With `jacobians` of closed orbits at or near the start, the first
     step to the border needs no run. The Jacobians may belong to another line through the keys: further steps learn the
-    derivative along this line. `sign`, `rtol` and `swings` have the meaning that they have for `close`.
+    derivative along this line. `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one, and `swings`
+    counts swings in that time. Runs have the relative tolerance `rtol`.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border

@@ -213,7 +213,7 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
-    """Return the keys of a law's lists, such as "friction.thresholds.2", whose value is not 0.
+    """Return the keys of a law's lists, such as "friction.element_stiffness.2", that are not 0.
 
     `flat` has the stage's keys.
     """

@@ -118,7 +118,7 @@ class LawVerdict:
         return (min(lowest), max(highest)) if margins else None
 
     def edges_certain(self, case: str) -> bool:
-        """Tell whether the edges of hunting in a case are certain, those that were found."""
+        """Tell whether all edges of hunting that were found in a case are certain."""
         margins = [trial.cases[case].judgement.margin for trial in self.trials]
         return all(edge.certain for edge in margins if edge)
 
@@ -251,7 +251,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
     """Return friction keys of stages under each other law that keeps their measured friction.
 
-    The stages differ in numbers of their friction. Their values [SI] are as converted and, for each key that
+    The stages differ in numbers of their friction. The keys' values [SI] are as converted and, for each key that
     measurements leave open, at both ends of its range. They come by the names of law and key. Laws that keep the
     measured friction of some stages only are left out. Raises InputError for a stage whose law cannot say what would be
     measured.

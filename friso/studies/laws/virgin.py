@@ -42,9 +42,10 @@ class VirginPoints:
     stiffness: tuple[float, float]
 
     def means(self, force: np.ndarray) -> np.ndarray:
-        """Return forces [N] at the displacements, shape (n,), averaged over neighbouring points.
+        """Return forces at the displacements [N], averaged over neighbouring points.
 
-        An average is over `together` points, enough to suppress scatter, so the result is shorter than n.
+        `force` has the shape (n,). An average is over `together` points, enough to suppress scatter, so the result is
+        shorter.
         """
         return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
 

@@ -176,7 +176,7 @@ class RailRuns:
 
     @property
     def counted(self) -> np.ndarray:
-        """Return which runs have a distinct peak, and so count as hunting in the thesis's way."""
+        """Return which runs have a distinct peak."""
         return self.peaks > 0
 
     def shaped(self, *shape: int) -> RailRuns:

@@ -1,6 +1,6 @@
-"""Experiment at constant speed: friction force along the rail, and over velocity.
+"""Friction force at constant speed along the rail.
 
-Thesis, Sec. 4.2.3, Fig. 21; more speeds show what its two do not.
+Thesis, Sec. 4.2.3, Fig. 21. More speeds than the thesis's two show friction over velocity.
 """
 
 from __future__ import annotations

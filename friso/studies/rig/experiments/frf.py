@@ -1,7 +1,6 @@
-"""Frequency-response experiment: plants, locked at ten places and free, and open loops.
+"""Frequency responses of the plant, locked at ten places and free, and of open loops.
 
-All are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29). Open loops are measured at several
-crossovers.
+They are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29), open loops at several crossovers.
 """
 
 from __future__ import annotations

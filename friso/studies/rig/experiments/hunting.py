@@ -1,4 +1,4 @@
-"""Hunting experiment: a move at several crossovers, with the joint locked and free.
+"""A move at several crossovers, with the joint locked and free, which may end in hunting.
 
 Thesis, Fig. 24, 25; on the stage's rail and on further rails with other seeds.
 """

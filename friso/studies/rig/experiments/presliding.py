@@ -1,4 +1,4 @@
-"""Presliding experiment: stiffness and damping of the bearing's bristles, from small motion.
+"""Stiffness and damping of the bearing's bristles, from small motion before it slides.
 
 Loops up to break-away tell friction laws apart. The joint is locked. The thesis has no such experiment, but the
 bristles decide whether a machine near the boundary of hunting hunts.

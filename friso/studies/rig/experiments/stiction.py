@@ -1,4 +1,4 @@
-"""Stiction experiment: static friction by stick-slip in slow motion.
+"""Static friction by stick-slip in slow motion.
 
 Thesis, Sec. 4.2.3, Fig. 20.
 """

@@ -1,4 +1,4 @@
-"""Stiffness experiment: stiffness of the joint by position steps, with the cart fixed.
+"""Stiffness of the joint by position steps, with the cart fixed.
 
 Thesis, Sec. 4.2.2, Fig. 19.
 """
