@@ -129,7 +129,7 @@ def prepare(
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Return the initial states of stages at rest, their masses displaced as the motion says.
 
-    Measurements of the masses are displaced too.
+    Filters have settled, and the actuator carries the constant forces.
     """
     return kernel.balanced({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
 

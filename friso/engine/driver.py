@@ -303,7 +303,7 @@ def note_tick(B, layout, lane, settings, results):
 
 
 def take_samples(B, layout, batch, settings, results):
-    """Let the drives of all lanes take a sample, where one is due.
+    """Let the drives of all runs in the buffer take a sample, where one is due.
 
     Tables are looked up before, and what is to be recorded is written after it.
     """

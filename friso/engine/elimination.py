@@ -48,9 +48,9 @@ class Elimination:
 def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
     """Write the elimination of a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal.
 
-    Rows not in `diagonal` have only the common entry ``diagonal`` on the diagonal, whose inverse is ``inverse``. The
-    pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves` solutions
-    cheaper.
+    Rows not in `diagonal` have the variable ``diagonal``, 1/(gamma h), on the diagonal; the variable ``inverse`` is its
+    inverse. The pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves`
+    solutions cheaper.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)

@@ -402,7 +402,10 @@ class _Frame(ast.NodeVisitor):
         return _Value(loaded, INT if array.kind.dtype == "int64" else FLOAT)
 
     def _element(self, array: _ArrayValue, node: ast.expr) -> ir.Value:
-        """Write the address of an element, or of the first element with this first index."""
+        """Write the address of an array's element at some indices.
+
+        With the first index alone, it is the first element that has this index.
+        """
         index = node.elts if isinstance(node, ast.Tuple) else [node]
         if len(index) not in (1, len(array.shape)):
             self.generic_visit(node)

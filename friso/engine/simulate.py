@@ -33,12 +33,19 @@ MOST_SAMPLES = 20_000_000
 def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
     """Simulate a stage's own motion, and return its time response.
 
-    Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and its
-    shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far as the
-    stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage as TOML
-    text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration; samples are
-    taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has NaN from
-    there on, and the reason in `status`. Raises InputError for a sample time and a tolerance that is not usable.
+    Variables over `time` [s] are, as far as the stage has them:
+
+    - reference, position, velocity and error;
+    - force and its shares (the controller's terms);
+    - cart position and velocity;
+    - joint deflection and force;
+    - friction force and bristle deflection.
+
+    The extrema of position minus reference are over `turning_point`. Each variable has `units`, those of the stage's
+    kind of axis, and a `long_name`. `attrs` hold the stage as TOML text, rtol, status, steps and rejected steps.
+    `sample_time` [s] is by default a 20 000th of the duration; samples are interpolated between the solver's steps. A
+    run that fails has NaN from there on, and the reason in `status`. Raises InputError for a sample time or a tolerance
+    that is not usable.
     """
     flat = stage.flat()
     duration = flat["motion.duration"]

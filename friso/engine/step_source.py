@@ -20,22 +20,33 @@ from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 
 THIRDS = (1 / 3, 2 / 3)
-"""Places inside a step at which kinks are evaluated; with both ends they fix a cubic."""
+"""Fractions of a step at which kinks (where derivatives jump) are evaluated.
+
+With both ends they fix a cubic.
+"""
 
 
 POINTS = ("near", "third", "far", "last")
-"""Names of the values of a kink's surface at the start, the thirds and the end of a step."""
+"""Names of the values of a kink's surface at the start, the thirds and the end of a step.
+
+At a kink derivatives jump.
+"""
 
 HYSTERESIS = 3e-3
-"""Distance beyond a kink, over the tolerance, at which it counts as crossed. A lane that has crossed a kink is then
-clear of it, and rounding noise crosses nothing."""
+"""Distance beyond a kink, over the tolerance, at which it counts as crossed.
+
+A run that has crossed a kink is then clear of it, and rounding noise crosses nothing. At a kink derivatives jump.
+"""
 
 
 SAFETY = 0.77
 """Factor on the step that the error estimate would allow. Larger values reject more steps than they save."""
 
 AFTER_KINK = 0.25
-"""Factor on the proposed step after a kink, behind which the motion may be much faster."""
+"""Factor on the proposed step after a kink (where derivatives jump).
+
+Behind it the motion may be much faster.
+"""
 
 
 WIDE = 3.0
@@ -56,7 +67,10 @@ NO_SWING = 1e-6
 """Rate, over the velocity's tolerance, below which a deviation turns only by rounding."""
 
 HAPPENED = "entered | turned | (now >= next_sample)"
-"""Condition under which a lane needs attention, besides the end of a piece of the reference."""
+"""Condition under which the loops around the step must look at a run.
+
+Another one is the end of a piece of the reference.
+"""
 
 DIVERGED = 1e6
 """Deviation at which a run ends as diverged, in length scales of the motion."""
@@ -123,17 +137,26 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """Return a block that computes the jumps of states at a kink, and the states' indices."""
+        """Return a block that computes the jumps of states at a kink, and the states' indices.
+
+        At a kink derivatives jump, or states.
+        """
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
-        """Return the magnitude of a kink's surface while states have their usual magnitudes."""
+        """Return the magnitude of a kink's surface while states have their usual magnitudes.
+
+        At a kink derivatives jump; its surface is a function that is 0 there.
+        """
         sizes = (sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
         return sum(sizes, start=sp.S.Zero)
 
     def _rounding(self, surface: sp.Expr) -> sp.Expr:
-        """Return the magnitude of the terms of a kink's surface, which decides its rounding error."""
+        """Return the magnitude of the terms of a kink's surface, which decides its rounding error.
+
+        At a kink derivatives jump; its surface is a function that is 0 there.
+        """
         terms = (sp.Abs(sp.diff(surface, x)) * sp.Abs(x) for x in self.model.symbols)
         return sum(terms, start=sp.S.Zero)
 
@@ -189,8 +212,8 @@ class StepWriter:
     def locate_source(self) -> str:
         """Write the function `locate(B)` for one run; nothing for a model without a clock.
 
-        It tells whether the drive has `ticked`, whether a table cell has been `left`, and whether a sample is to be
-        `noted`.
+        It finds out whether a table cell has been `left`, and whether a sample is to be `noted`, if the drive has
+        `ticked`. It returns true for either.
         """
         if not self.model.clock:
             return ""
@@ -367,9 +390,10 @@ class StepWriter:
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """Write the search for the first crossing of a kink: at `fraction`, 1 if there is none.
+        """Write the search for the first crossing of a kink (where derivatives jump) in the step.
 
-        `astray` is true if a run is on the other side of a kink than its mode says.
+        It is at the fraction `fraction` of the step, 1 if there is none. `astray` is true if a run is on the other side
+        of a kink than its mode says.
         """
         lines = []
         for point, theta in enumerate(THIRDS):
@@ -438,7 +462,10 @@ class StepWriter:
         ]
 
     def _passed_over(self) -> list[str]:
-        """Write the test for whether the step may have `passed_over` a narrow peak about a kink."""
+        """Write the test for whether the step may have `passed_over` a narrow peak.
+
+        Such a peak may lie about a kink, where derivatives jump.
+        """
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
@@ -448,7 +475,7 @@ class StepWriter:
         return lines
 
     def _jump(self) -> list[str]:
-        """Write the jumps of states and modes at the kinks just crossed.
+        """Write the jumps of states and modes at the kinks just crossed, where derivatives jump.
 
         Modes with memory change one after the other, because several may change at one instant: the result of the first
         is the input of the second.

@@ -174,7 +174,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return encoder's reading [m], commanded force [N], and the numbers that the drive keeps.
+    """Return the encoder's reading [m], the commanded force [N], and numbers the drive keeps.
 
     These numbers are kept from one sample to the next.
     """

@@ -43,7 +43,10 @@ class Loop:
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
-    """Return the sign (1, -1 or 0) of the first of some rates that is not 0."""
+    """Return the sign (1, -1 or 0) of the first of some rates that is not 0.
+
+    The rates are velocity, acceleration and so on, so it is the direction in which a motion goes on.
+    """
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
     return Piecewise(*cases, (sp.S.Zero, True))
 

@@ -1,7 +1,7 @@
 """Define the building blocks of the model in SymPy symbols: states, kinks and outputs.
 
-A parameter is a symbol named after its stage-file key. So its value is looked up among the stage's keys, and a
-derivative with respect to it is a sensitivity to that key.
+Kinks are where derivatives jump. A parameter is a symbol named after its stage-file key. So its value is looked up
+among the stage's keys, and a derivative with respect to it is a sensitivity to that key.
 """
 
 from __future__ import annotations
@@ -160,14 +160,17 @@ class Kink:
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
-        """Return the kink under another name.
+        """Return the kink (where derivatives jump) under another name.
 
         Expressions that contain the old `beyond` must be given the new one.
         """
         return replace(self, name=name)
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
-        """Return the kink with expressions replaced by others: `values` maps old to new ones."""
+        """Return the kink (where derivatives jump) with expressions replaced by others.
+
+        `values` maps old to new ones.
+        """
         surface, narrow = (cast(sp.Expr, expression.xreplace(values)) for expression in (self.surface, self.narrow))
         starts = None if self.starts is None else cast(sp.Expr, self.starts.xreplace(values))
         return Kink(self.name, surface, narrow=narrow, starts=starts)

@@ -1,4 +1,7 @@
-"""Assemble a stage's equations from parts: states, right-hand side, kinks, outputs."""
+"""Assemble a stage's equations from parts: states, right-hand side, kinks, outputs.
+
+Kinks are where derivatives jump.
+"""
 
 from __future__ import annotations
 
@@ -47,10 +50,9 @@ class Model:
     - `breakaway` [N]: largest friction force at rest; `steady` [N]: friction in a steady motion, None where the law
       lacks it.
     - `stiffness` [N/m]: proportional stiffness of the loop.
-    - `jumps`: jumps of states where a kink is crossed, in terms of the values just before: kinks to states to
-      expressions.
-    - `inputs`: values given anew at every corner of the reference, in this order; `reference`: of what its pieces are
-      made.
+    - `jumps`: for each kink, the jumps of states where it is crossed, as expressions of the values just before.
+    - `inputs`: values that are new at every corner of the reference, in this order; `reference`: what its pieces
+      consist of.
     - `held`: numbers that stay constant between corners, or between the samples of a `clock` if there is one.
     """
 
@@ -115,7 +117,10 @@ class Model:
 
 
 def resets(kinks: Iterable[Kink]) -> dict[Kink, dict[sp.Symbol, sp.Expr]]:
-    """Return the jumps of states where a mode with memory changes (see `Model.jumps`), by kink."""
+    """Return the jumps of states where a mode with memory changes, by the mode and the state.
+
+    The values are expressions of the values just before. Modes are among the `kinks`, where derivatives jump.
+    """
     switches = (kink for kink in kinks if isinstance(kink, Switch))
     return {switch: {x: new - x for x, new in becomes.items()} for switch in switches if (becomes := switch.becomes)}
 

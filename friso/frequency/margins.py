@@ -192,7 +192,7 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
-    """Return the frequency [rad/s] at which L comes closest to -1, and the distance.
+    """Return the frequency [rad/s] at which the loop L comes closest to -1, and the distance.
 
     `distance` has the distances at frequencies `omega` [rad/s].
     """

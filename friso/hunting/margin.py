@@ -125,7 +125,7 @@ class _Grid:
     """
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
-        """Survey the stages at the factors numbered `first` and higher. Raises Exhausted."""
+        """Survey the stage at the bandwidth factors numbered `first` and higher. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
         self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
         self.motions: list[list[Swinging]] = [[] for _ in factors]
@@ -167,11 +167,11 @@ class _Grid:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
-        """Return the stage with its bandwidth multiplied by the numbered factors."""
+        """Return the stage with its bandwidth multiplied by some of the factors, by number."""
         return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
-        """Record a thorough survey of the stage at the factor numbered `index`."""
+        """Record a thorough survey of the stage at the bandwidth factor numbered `index`."""
         self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
         self.motions[index] = list(survey.motions)
         self.inspected.add(index)
@@ -212,11 +212,11 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Find where attraction ends between the factor numbered `at` and the next above or below.
+        """Find where attraction ends between the bandwidth factor numbered `at` and a neighbour.
 
-        `ahead` is 1 for above and -1 for below. Returns None if attraction reaches the end of the search, which is then
-        recorded for all factors up to there. It does so too if closer inspection shows no attractor. If the allowance
-        is used up, the end is not certain.
+        The neighbour is the next factor above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of
+        the search, which is then recorded for all factors up to there. It does so too if closer inspection shows no
+        attractor. If the allowance is used up, the end is not certain.
         """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
@@ -227,10 +227,10 @@ class _Grid:
             return self.ends.setdefault((at, ahead), end)
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Follow attraction from the factor numbered `at` to its end, up (`ahead` 1) or down (-1).
+        """Follow attraction from the bandwidth factor numbered `at` to its end.
 
-        Returns None if attraction reaches the end of the search, or if closer inspection shows no attractor. Raises
-        Exhausted.
+        It is followed up (`ahead` 1) or down (-1). Returns None if attraction reaches the end of the search, or if
+        closer inspection shows no attractor. Raises Exhausted.
         """
         if not self.proved(at, ahead):
             return None
@@ -264,7 +264,7 @@ class _Grid:
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
-        """Tell whether the stage hunts at the factor numbered `at`, after trying to close orbits.
+        """Tell whether the stage hunts at the bandwidth factor numbered `at`, after closing orbits.
 
         If it does not, neighbouring factors that seemed to have an attractor are inspected too: those below if `ahead`
         is 1, above if it is -1.
@@ -289,7 +289,7 @@ class _Grid:
         self.inspected |= set(numbers.tolist())
 
     def lower_end(self, index: int) -> AttractionEnd | None:
-        """Find the end of attraction below the factor numbered `index`.
+        """Find the end of attraction below the bandwidth factor numbered `index`.
 
         Returns None if attraction reaches the end of the search, or if it is not certain that the stage does not hunt
         below.

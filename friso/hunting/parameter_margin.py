@@ -147,7 +147,10 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Return factors to try between the one numbered `first`, with a change, and the one before."""
+        """Return factors to try between the factor numbered `first` and the one before.
+
+        At the first of both hunting has changed, at the other not.
+        """
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 

@@ -28,7 +28,7 @@ class ToleranceSettings(Settings):
     """Tolerance of repeated runs where only simulations show an attractor. A looser one would be no second opinion."""
 
     landing_rtol: float = setting(1e-6, "")
-    """Tolerance of runs that find landings. They scatter by less than the gaps between points of a map."""
+    """Tolerance of runs that find where stages stick. They scatter by less than the gaps between points of a map."""
 
     sketch_rtol: float = setting(1e-5, "")
     """Tolerance of sketches, which separate hunting from settling but do not locate the edge."""
@@ -259,11 +259,10 @@ class TrackingSettings(Settings):
     """Newton steps, or equal waits, after which a periodic response is abandoned."""
 
     periods_waited: int = setting(4, "periods")
-    """Periods of a plain run where kinks of friction keep a Newton step from coming closer."""
+    """Periods of a plain run where jumps of friction's derivatives keep a Newton step from coming closer."""
 
     derivative_step: float = setting(1e-4, "of the scales of the states")
-    """Step of numerical derivatives. Smaller ones are lost in the tolerance; larger ones reach across kinks of
-    friction."""
+    """Step of numerical derivatives. Smaller ones are lost in the tolerance; larger ones cross jumps of derivatives."""
 
     closed_distance: float = setting(1e-4, "of the scales of the states")
     """Largest distance between states one period apart on a closed response, of which three digits are shown."""

@@ -197,8 +197,8 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 def _hardly_attracts(landing_map: LandingMap) -> bool:
     """Tell whether a coarse map has no attractor that can be trusted.
 
-    A trusted attractor is simple, strongly stable, and reached from enough points. Where the next landing is almost as
-    far off as the last, straight pieces between points create long cycles that the stage does not have.
+    A trusted attractor is simple, strongly stable, and reached from enough points. Where a stage next sticks almost as
+    far off as before, straight pieces between points create long cycles that the stage does not have.
     """
     settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2

@@ -175,7 +175,7 @@ def parse_set(text: str) -> tuple[str, Any]:
 def _value(text: str) -> Any:
     """Return a TOML value, or the text itself if it is no TOML value.
 
-    An inline table holds neither comments nor a second line.
+    A text with a comment or a second line is no value, because it is read as part of an inline table.
     """
     if _MANY_PARTS.search(text):
         return text

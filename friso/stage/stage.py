@@ -582,9 +582,9 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:
-    """Return the index, from 0, of the array element that a part of a key means, "2" for 1.
+    """Return the index, from 0, of an array element, by its number in a key: 1 for "2".
 
-    `depth` is the place of the part in the key. Raises StageError.
+    The number is the part of the key at the place `depth`. Raises StageError if the array `values` has no such element.
     """
     parts = key.split(".")
     number, array = parts[depth], ".".join(parts[:depth])

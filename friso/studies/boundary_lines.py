@@ -217,7 +217,7 @@ def begins_at(line: Line, k: int) -> bool | None:
 def _attracts_at(result: Diagram, place: float) -> bool:
     """Tell whether a branch has a stable cycle on both sides of a stage in the range.
 
-    `place` is the stage's fraction of the range. False if a branch is in doubt there.
+    `place` is the stage's fraction of the range. False if the stability of a branch is unknown there.
     """
     if result.in_doubt(np.array([place]))[0]:
         return False

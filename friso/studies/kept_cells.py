@@ -25,7 +25,7 @@ class KeptCells:
         self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
 
     def keeping(self, ask: Ask) -> Ask:
-        """Return a function like `ask` that stores its answers, or takes stored ones.
+        """Return the function `ask`, changed to store its answers or to take stored ones.
 
         `ask` computes the metrics of cells from the cells' indices.
         """

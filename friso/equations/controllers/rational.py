@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SAMPLE_TIME, DRIVE_TIME, LOOP_TIME = f"{CONTROLLER}.sample_time", "drive.sample_time", "drive.position_sample_time"
 PARTS = "parts"
-"""Prefix of the flat keys that hold the coefficients of integral and sections."""
+"""Prefix of the keys in a stage that hold the coefficients of integral and sections."""
 
 AT_ZERO = 1e3 * ROUNDING
 """Largest distance from 0 (in z: from 1) at which a pole counts as an integrator, relative to the largest pole (in z:
@@ -289,7 +289,8 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
     """Return the coefficients of s and s^2 of second-order factors.
 
-    With an odd number of times, the last factor is of first order and has None for s^2.
+    They are made of factors 1 + t s with the `times` t, in pairs. With an odd number of times, the last factor is of
+    first order and has None for s^2.
     """
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)

@@ -38,10 +38,10 @@ LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "visc
 class Friction:
     """A friction law's equations: the force [N] against the velocity, its states and its scales.
 
-    `component` has states, kinks and outputs. `breakaway` [N] is the largest force at rest, from which the solver takes
-    its length scale. `sliding` is for a steady motion at the velocity. It gives the law's own states, its modes with
-    memory, and the sides of its kinks other than the direction. Without `sliding`, they are the values at which the
-    states do not change. At rest all modes with memory have been left.
+    `component` has states, outputs, and kinks (where derivatives jump). `breakaway` [N] is the largest force at rest,
+    from which the solver takes its length scale. `sliding` is for a steady motion at the velocity. It gives the law's
+    own states, its modes with memory, and the sides of its kinks other than the direction. Without `sliding`, they are
+    the values at which the states do not change. At rest all modes with memory have been left.
     """
 
     def __init__(
@@ -66,8 +66,8 @@ class Friction:
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
 
-        The side of the direction is left out. Raises ValueError if the law does not say how it slides steadily, and its
-        equations are not linear in its states.
+        Kinks are where derivatives jump; the reversal of the velocity is left out. Raises ValueError if the law does
+        not say how it slides steadily, and its equations are not linear in its states.
         """
         import sympy as sp
 
@@ -100,7 +100,7 @@ class Friction:
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
         """Return on which side of its kinks the law is, as conditions on its `states`.
 
-        The direction of the motion and modes with memory are left out.
+        Kinks are where derivatives jump; the direction of the motion and modes with memory are left out.
         """
         from friso.equations.cases import Piecewise
         from friso.equations.component import Switch
@@ -129,7 +129,7 @@ def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
 
 
 DIRECTION = "forward"
-"""Name of the kink at which the velocity changes its direction."""
+"""Name of the kink (where derivatives jump) at which the velocity changes its direction."""
 
 
 def _is_direction(kink: Kink) -> bool:

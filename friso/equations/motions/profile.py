@@ -94,8 +94,9 @@ def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
 def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
     """Return the pieces of a move that begins at a time [s] and a position [m].
 
-    Some pieces may have no duration. The highest derivative changes at every sum of some of the widths. The second half
-    mirrors the first, so that the move ends exactly at its target, at rest.
+    Some pieces may have no duration. A piece begins at every sum of some of the averages' widths (`Plan.widths`), where
+    the highest derivative changes. The second half mirrors the first, so that the move ends exactly at its target, at
+    rest.
     """
     order = len(move.widths)
     choices = np.array(list(product((0, 1), repeat=order)))

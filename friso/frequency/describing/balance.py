@@ -93,8 +93,9 @@ def single_harmonic(
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return how often a complex function turns round zero along the edges of each cell.
 
-    `left` has its values on a grid. The count is that of the zeros inside, with -1 for mirrored ones. The second result
-    marks cells for which the count is unknown, because a corner is NaN; the first is 0 there.
+    `left` has its values on a grid. The count is that of the zeros inside a cell; a zero about which the function turns
+    the other way counts -1. The second result marks cells for which the count is unknown, because a corner is NaN; the
+    first is 0 there.
     """
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))

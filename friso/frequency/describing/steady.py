@@ -40,7 +40,10 @@ class Imposition:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
-        """Make the friction of stages moved at amplitudes [m] and frequencies [Hz], both (count,)."""
+        """Make the friction of stages under sinusoidal motions, all of shape (count,).
+
+        The motions have `amplitudes` [m] and `frequencies` [Hz]; `flat` has the stages' keys in SI.
+        """
         friction = {key: value for key, value in flat.items() if key.startswith("friction.")}
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)

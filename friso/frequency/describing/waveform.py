@@ -1,9 +1,10 @@
-"""Compute the friction force on any periodic motion, and its derivative.
+"""Compute the friction force on any periodic motion, and its derivative by the motion.
 
-Both are used for multi-harmonic balance. The derivative is by the motion. The law's own state obeys a differential
-equation under a velocity given at the middles of M equal intervals. The implicit midpoint rule makes it a chain that
-ends where it began. Over half a period of a symmetric motion it ends at the mirror image. The force at the middles
-follows. The rule is of second order, and a fast state settles on its steady value however long the intervals are.
+Multi-harmonic balance uses both. The period is divided into M equal intervals, at whose middles the velocity is given.
+The friction law has one state of its own, which obeys a differential equation. The implicit midpoint rule makes this a
+chain of M steps, which must end where it began. Over half a period of a symmetric motion it ends at the mirror image.
+The force at the middles follows. The rule is of second order, and a fast state settles on its steady value however long
+the intervals are.
 """
 
 from __future__ import annotations

@@ -74,5 +74,5 @@ def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
 
 
 def _compared(swings: int) -> int:
-    """Return how many swings are compared with earlier ones to detect a repetition."""
+    """Return how many swings to compare with earlier ones to detect a repetition after `swings`."""
     return max(swings, 4)

@@ -192,7 +192,10 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk ended at the farthest place, not at the first or for another reason."""
+        """Tell whether a walk ended at the farthest place on the line of keys.
+
+        False if it ended at the first place, or for another reason.
+        """
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:

@@ -27,7 +27,7 @@ class Diagram:
     """Bifurcation diagram over a range of one key: branches of cycles, and special points.
 
     The arrays belong to stages spaced evenly over the range, at `places` from 0 to 1. `cycles` are their hunting
-    cycles. `attracts` says whether there is an attractor, `decided` whether that is known. `unstable` says whether the
+    cycles. `attracts` is true for a stage with an attractor, and `decided` if that is known. `unstable` is true if the
     loop is unstable regardless of friction. Each has the shape (places,).
     """
 

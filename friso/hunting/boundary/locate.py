@@ -210,7 +210,10 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
 
 
 def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
-    """Return orbits on either side of the orbit `guess`, along a direction, within `reach`."""
+    """Return orbits on both sides of the orbit `guess`, in steps along a branch, up to `reach`.
+
+    `direction` (3,) is that of the branch, in the space of place, log distance and log time.
+    """
     settings = ContinuationSettings.current()
     orbits: list[Point] = []
     for way in (-1.0, 1.0):

@@ -18,7 +18,7 @@ GENERIC = 0.4721359549995794
 """Irrational position in a key's range, from 0 to 1, at which no key has a special value."""
 
 FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
-"""Function that turns arrays of values, by name, into flat keys of stages (SI)."""
+"""Function that turns arrays of values, by name, into the keys of stages with SI values."""
 
 
 @dataclass(frozen=True)

@@ -348,9 +348,10 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Return derivatives of all errors by states, time and place along the line of keys.
+        """Return derivatives of all errors of orbits by state, time and place along the keys' line.
 
-        Where a limiter chatters, the column of the place is kept as long as the closing gap shrinks.
+        The errors are those of closing, of the phase and of the distance from the border. Where a limiter chatters, the
+        column of the place is kept from earlier for as long as the closing error shrinks.
         """
         settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)

@@ -151,8 +151,9 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
     """Tell whether an attractor of a map is a given closed cycle of its stage.
 
-    They are compared by size and by number of landings. With `exactly`, the numbers of landings must be equal;
-    otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away force.
+    They are compared by size, and by how often the stage sticks until they repeat. With `exactly`, these numbers must
+    be equal; otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away
+    force.
     """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):

@@ -62,7 +62,7 @@ class LandingMap:
 
     @classmethod
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
-        """Make the map from the landings of runs of one stage.
+        """Make the map from the landings of runs of one stage: where it sticks after each swing.
 
         The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
         deflection of the loop by the break-away force.
@@ -90,7 +90,7 @@ class LandingMap:
 
     @property
     def sides(self) -> tuple[float, ...]:
-        """Return the signs of the sides of the reference that the map treats separately."""
+        """Return the sides of the reference that the map treats separately: 1 alone, or 1 and -1."""
         return (1.0,) if self.symmetric else (1.0, -1.0)
 
     def points(self, side: float) -> np.ndarray:
@@ -148,7 +148,7 @@ class LandingMap:
         return np.array(begins), np.array(values), np.array(slopes)
 
     def next(self, places: np.ndarray) -> np.ndarray:
-        """Return the coordinates of the next landings, from those of landings, shape (count,).
+        """Return the coordinates of the landings that follow landings at `places`, both (count,).
 
         Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
         """

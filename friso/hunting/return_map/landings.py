@@ -19,7 +19,7 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().landing_rtol
-"""Relative tolerance of the runs that find landings."""
+"""Relative tolerance of the runs that find where stages stick."""
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Choose starts for more runs of a stage, whose landings should fill gaps in its map."""
+        """Choose starts for more runs of a stage, so that points fill gaps in its map."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]

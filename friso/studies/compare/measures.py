@@ -31,8 +31,8 @@ class MachineMeasures:
     """Measures of the runs of machines, arrays of shape (count,).
 
     - `outcome`: words of `friso.hunting.criteria.run_outcome`, with the tolerance as band; `counted`: distinct peaks.
-    - `settling` [s]: see `friso.hunting.criteria.settling`. It is infinite if the machine swings, creeps, or is not in
-      position at the far end of its motion when it returns.
+    - `settling` [s]: longest time to settle at a place (`friso.hunting.criteria.settling`). It is infinite if the
+      machine swings, creeps, or is not in position at the far end of its motion when it returns.
     - `in_position` [m]: root mean square of the deviation in the last quarter of the run.
     - `force` [N]: root mean square of the commanded force over the whole run.
     """
