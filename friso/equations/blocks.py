@@ -115,8 +115,8 @@ class Signal:
 class Measured:
     """Measured inputs of a controller, as signals.
 
-    From encoders come error and position [m], and `rated`: the position behind the velocity, which another encoder may
-    measure. Of the reference come velocity [m/s], acceleration [m/s^2], direction (1, -1, 0) and jerk [m/s^3].
+    From encoders come error and position [m], and `rated`: the position from which the velocity is taken, perhaps of
+    another encoder. Of the reference come velocity [m/s], acceleration [m/s^2], direction (1, -1, 0) and jerk [m/s^3].
     """
 
     error: Signal

@@ -194,7 +194,10 @@ def _held(machine: System, drive: DriveTiming) -> System:
 
 
 def _continuous(flat: Mapping[str, Any], members: int, cut: str) -> System:
-    """Return the controller in continuous time, without the measured signal `cut`."""
+    """Return the controller in continuous time, without the measured signal `cut`.
+
+    There are `members` equal ones, unless keys are arrays.
+    """
     control = compensator(flat, members)
     return unseen(control, cut) if cut else control
 

@@ -319,6 +319,9 @@ class _Grid:
         )
 
     def _spans(self) -> list[tuple[int, int]]:
-        """Return the first and last numbers of each group of neighbouring factors with an attractor."""
+        """Return the first and last numbers of each group of bandwidth factors with an attractor.
+
+        The factors of a group are neighbours.
+        """
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
         return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

@@ -227,7 +227,7 @@ class EdgeSearch:
         assert cycles is not None
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at places: logarithms of the factor over that of the start."""
+            """Return the stages at places: logarithms of the bandwidth over that at the start."""
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))

@@ -173,9 +173,9 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
     This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A coarse return map
-    decides. If its attractor is weak, or landings wander, the cycles that Newton's method closes from the map at rest
-    decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if an
-    allowance of work is used up.
+    decides. If its attractor is weak, or sticking distances wander, the cycles that Newton's method closes from the map
+    at rest decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if
+    an allowance of work is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []

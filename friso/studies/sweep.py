@@ -114,7 +114,7 @@ def run_in_memory(
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of a study's store, and return the study as it is opened.
+    """Run the missing blocks of a study's store, and return the study as read from the store.
 
     The store at `path` is created if necessary. `verify` is the fraction of cells to run again at a tighter tolerance.
     Raises InputError for a folder that cannot be this store.
@@ -124,7 +124,7 @@ def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, prog
 
 
 def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of an opened store, and return its study.
+    """Run the missing blocks of an opened store, and return the study as read from it.
 
     `verify` is the fraction of cells to run again at a tighter tolerance.
     """

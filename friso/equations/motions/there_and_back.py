@@ -26,7 +26,7 @@ def _time_there(flat: Mapping[str, Any]) -> Any:
 class ThereAndBack(Motion):
     """Two equal steps, there and back, each accelerating for acceleration_time and braking so.
 
-    With a cruise_ratio, at constant speed in between for so many times the acceleration_time.
+    With a cruise_ratio, a step has constant speed in between, for so many times the acceleration_time.
     """
 
     kind: Literal["there_and_back"]

@@ -56,8 +56,8 @@ class Landings(ArrayRows):
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
     """Follow stages from states, (runs, states), until each has landed `most` times or rests.
 
-    Runs have the relative tolerance `rtol`. A round lasts as long as a sticking stage may take to wind up and to cross
-    its reference.
+    A stage lands where it sticks after a swing. Runs have the relative tolerance `rtol`. They go on in rounds, each as
+    long as a sticking stage may take to wind up and to cross its reference.
     """
     orbit_settings = OrbitSettings.current()
     settings = ReturnMapSettings.current()

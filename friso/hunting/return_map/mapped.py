@@ -62,7 +62,7 @@ class Mapped:
 
     @property
     def attracts(self) -> np.ndarray:
-        """Return which stages have a map on which landings continue for ever, shape (count,)."""
+        """Return which stages have a map on which swings continue for ever, shape (count,)."""
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:

@@ -162,7 +162,10 @@ class VerdictsByLaw:
         return set().union(*(verdict.answers(case) for verdict in self.verdicts))
 
     def depends_on_law(self, case: str) -> bool:
-        """Tell whether some laws certainly hunt in a case and others certainly do not."""
+        """Tell whether the stage certainly hunts in some trials of a case, and surely not in others.
+
+        Trials differ in the law, or in keys that the measurements leave open.
+        """
         return len(self.answers(case)) > 1
 
     def uncertain(self, case: str) -> list[str]:
