@@ -56,8 +56,9 @@ class Batch(NamedTuple):
 class BatchOptions(NamedTuple):
     """Options of all runs in a batch.
 
-    They are the relative tolerance, the step budget, the two bands of settling [m], the time [s] from which turning
-    points are kept, the sampling interval [s], and a flag, shape (1,), which when set keeps further runs from starting.
+    `budget` is the most steps of a run. `inner` and `outer` [m] are the two bands of settling. `record_from` [s] is the
+    time from which turning points are kept, and `interval` [s] that between samples. Once the flag `cancel`, shape
+    (1,), is set, no further run starts.
     """
 
     rtol: float
@@ -103,10 +104,16 @@ STATISTICS = (
     "inner_before",
     "outer_before",
 )
-"""Names of the statistics of a run: largest force [N], extremes of the deviation in the window [m], last time outside
-each of the two bands [s], steps attempted and rejected, time reached [s], and for each band the longest time [s] to
-enter it at a place that the reference left again (infinite: not before the reference left; 0: no such place). Extremes
-and times are NaN for a drive with a clock; its samples are examined instead."""
+"""Names of the statistics of a run, in the order of their columns.
+
+- Largest force [N], and extremes of the deviation in the window [m].
+- Last time outside each of the two bands [s].
+- Steps attempted and rejected, and time reached [s].
+- For each band, the longest time [s] to enter it at a place that the reference left again. It is infinite if the
+  deviation did not enter before the reference left, and 0 if there is no such place.
+
+Extremes and times are NaN for a drive with a clock; its samples are examined instead.
+"""
 
 
 class Status(IntEnum):

@@ -50,9 +50,11 @@ Behind it the motion may be much faster.
 
 
 WIDE = 3.0
-"""Distance of a step's start from a kink, in widths of the narrow peak about the kink. A step from farther off that
-crosses the kink and ends beyond the peak, or on this side again, is repeated up to the kink, because all of its stages
-may lie beyond the peak."""
+"""Distance of a step's start from a kink, in widths of the narrow peak about the kink.
+
+A step from farther off may pass over the peak, because all of its stages may lie beyond. So such a step is repeated up
+to the kink if it crosses the kink and ends beyond the peak, or on this side again. At a kink derivatives jump.
+"""
 
 ROUNDING = 2e-15
 """Least hysteresis over the terms of a surface, nine units in their last place."""

@@ -37,9 +37,9 @@ class Limits:
 
     For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
     `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
-    the state that becomes unstable just above `highest_stable`, and `closest` the state that comes closest to -1 just
-    above `highest_comfortable` (None at the end of the search). Without a range, both states are given at the stage's
-    own crossover. For a controller given by gains all values are factors of its bandwidth.
+    the state that becomes unstable just above `highest_stable`. `closest` is the state that comes closest to -1 just
+    above `highest_comfortable`. Each is None if its range ends with the search. Without a range, both states are given
+    at the stage's own crossover. For a controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range

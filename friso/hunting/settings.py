@@ -217,7 +217,7 @@ class CheckSettings(Settings):
 
     lag_angle: float = setting(1e-3, "rad")
     """Phase lag of the force behind the error from which a controller counts as a lag. With a smaller one, the force at
-    standstill exceeds the force of a slip by only a few thousandths, so the slip stops even if Coulomb friction is a
+    standstill exceeds that of a slip by only a few thousandths. So the slip stops even if Coulomb friction is a
     hundredth of static friction."""
 
     lag_rates: tuple[float, float] = setting((1e-6, 30.0), "natural frequencies")

@@ -244,9 +244,13 @@ def search_alone() -> Iterator[None]:
 def has_a_map(stages: Ensemble) -> bool:
     """Tell whether the sticking distance alone may decide how stages go on.
 
-    It does not if a joint swings freely while the cart sticks, a limiter chatters, a force limit without anti-windup
-    lets swings grow, integrals of several loops wind up separately, or the stage may stand anywhere within a dead band
-    or a backlash.
+    It does not in any of these cases:
+
+    - A joint swings freely while the cart sticks.
+    - A limiter chatters.
+    - A force limit without anti-windup lets swings grow.
+    - Integrals of several loops wind up separately.
+    - The stage may stand anywhere within a dead band or a backlash.
     """
     if _SEARCHES_ALONE.get():
         return False

@@ -190,9 +190,10 @@ class Parasitic(UncertainSection):
 
 
 class Bias(UncertainSection):
-    """Constant forces, positive towards larger positions: of a cable, a tilted rail, or the weight of a vertical axis.
+    """Constant forces, positive towards larger positions.
 
-    Runs begin with the actuator carrying their sum.
+    They are due to a cable, a tilted rail, or the weight of a vertical axis. Runs begin with the actuator carrying
+    their sum.
     """
 
     cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None

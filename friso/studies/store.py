@@ -252,10 +252,10 @@ class Store:
 
 @check_arguments
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
-    """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
+    """Return the study in the store at `path` as a dataset whose values are read on access.
 
-    Cells that were not run yet are empty. Raises StoreError if there is none, its metadata or axes are damaged, or
-    anything but files is in it, and where damaged cells are looked at.
+    The study may be unfinished; cells that were not run yet are empty. Raises StoreError if there is no store, if its
+    metadata or axes are damaged, or if anything but files is in it. It is also raised on access to damaged cells.
 
     Examples
     --------

@@ -74,7 +74,7 @@ class MeasuredFriction:
 def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
     """Return displacements [m] at which to compare virgin curves, shape (n,).
 
-    They reach beyond break-away, or to the last of `corners` if that lies farther, and include all `corners`, the
+    They reach beyond break-away, or to the last of `corners` if that lies farther. They include all `corners`, the
     displacements at which a curve made of straight pieces bends.
     """
     usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))

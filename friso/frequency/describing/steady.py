@@ -129,10 +129,10 @@ def periodic_gap(rtol: float) -> float:
 
 @dataclass(frozen=True)
 class PeriodicStates:
-    """Periodic steady states of a friction law.
+    """Periodic steady states of a friction law under sinusoidal motions.
 
-    They are the law's own states at the farthest point of the motion (count, inner), the remaining `gap` after a period
-    relative to their scales, shape (count,), and which runs were completed, shape (count,).
+    `inner` (count, inner) are the law's own states at the farthest point of the motion. `gap` (count,) is their change
+    over a period, relative to their scales. `done` (count,) is true for completed runs.
     """
 
     inner: np.ndarray

@@ -29,8 +29,8 @@ BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 class Target(ArrayRows):
     """Motion that a run must reach to count as hunting: arrays of shape (count,), or numbers.
 
-    A run hunts if, after the time `lasting` [s], it still swings by at least `amplitude` [m], half of peak to peak,
-    with a period of at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
+    A run hunts if it still swings after the time `lasting` [s], by at least `amplitude` [m], half of peak to peak. Its
+    period must be at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
     Where attractors were only `observed` in simulations, others nearby may swing as far but less often.
     """
 

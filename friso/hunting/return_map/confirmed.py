@@ -19,10 +19,10 @@ PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     """Return for which stages runs land where the map predicts, in the shape of `numbers`.
 
-    Runs begin stuck at three distances from which the stage rests, at three from which it keeps swinging, and in the
-    widest gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a
-    hundredth of it. The prediction for a landing starts from the landing before. From the second landing on, every
-    landing must lie within the allowed scatter of its prediction.
+    A stage lands where it sticks after a swing. Runs begin stuck at three distances from which the stage rests, and at
+    three from which it keeps swinging. One more begins in the widest gap between starts of the map. Each is followed
+    for some landings, at the tolerance of the map and at a hundredth of it. The prediction for a landing starts from
+    the landing before. From the second landing on, every landing must lie within the allowed scatter of its prediction.
     """
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])

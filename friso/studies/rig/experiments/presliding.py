@@ -38,8 +38,11 @@ At the largest, some places along the rail break away.
 """
 
 PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
-"""Periods of the crossover that a loop takes, number of loops, and samples of the log per period of the crossover (0.5
-s and 1 ms on the thesis's rig)."""
+"""Periods of the crossover that a loop takes, and number of loops.
+
+SAMPLES are those of the log per period of the crossover. On the thesis's rig a loop takes 0.5 s, with samples 1 ms
+apart.
+"""
 
 
 @dataclass(frozen=True)
