@@ -61,7 +61,7 @@ def sweep(
     - peak_to_peak [m] and period [s] at the end of the run;
     - settling_time [s] into 1 um, and settling_time_10um [s];
     - largest_force [N];
-    - steps, rejected steps and status of the solver.
+    - steps and rejected, the solver's attempted and rejected steps, and status.
 
     A cell that no stage may have is "invalid", with the reason in its status. If named in `metrics`, there are also
     those of what attracts the stage, whatever its motion does:
