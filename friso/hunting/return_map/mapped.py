@@ -238,9 +238,10 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Return starts half-way between the starts of some runs and their neighbours.
+    """Return starts between those of some runs and their neighbours, half-way in the logarithm.
 
-    `starts` ascend; `numbers` are their runs, and `runs` the numbers of the runs in question.
+    `starts` ascend; `numbers` are their runs, and `runs` the numbers of the runs in question. Neighbours lie on the
+    same side of the reference.
     """
     between = []
     for run in runs:
