@@ -1,1 +1,1 @@
-"""Turn equations into numbers: generated kernels, cached on disk, run in lanes and threads."""
+"""Turn equations into numbers: compiled code, cached on disk, for several runs at once."""

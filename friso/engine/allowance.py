@@ -32,8 +32,8 @@ class Exhausted(Exception):
 class Allowance:
     """Work that runs may take together, and how much of it is `used`.
 
-    `work` counts steps times the work of a step of their kernel (`Kernel.work`; a unit is about 12 ns on a core of
-    2024). `exhausted` tells whether runs were dropped because this allowance, or one `around` it, did not suffice.
+    `work` counts steps times the work of a step (`Kernel.work`; a unit is about 12 ns on a core of 2024). `exhausted`
+    is true if runs were dropped because this allowance, or one `around` it, did not suffice.
     """
 
     work: float
@@ -48,7 +48,7 @@ class Allowance:
         return own if self.around is None else min(own, self.around.left)
 
     def most_steps(self, runs: int, step: float) -> float:
-        """Return how many steps of the work `step` each of some runs may take.
+        """Return how many steps each of several runs may take; a step takes the work `step`.
 
         Raises Exhausted if nothing is left.
         """
@@ -67,9 +67,9 @@ class Allowance:
         raise Exhausted
 
     def charge(self, steps: np.ndarray, step: float) -> None:
-        """Add the work of runs, from their numbers of steps, (runs,), and the work of a `step`.
+        """Add the work of runs, from their numbers of steps, (runs,), and the work of one `step`.
 
-        A single run counts as much as eight.
+        A single run counts as much as eight, because eight are computed side by side.
         """
         work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self

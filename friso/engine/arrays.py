@@ -11,8 +11,9 @@ import numpy as np
 class Tables(NamedTuple):
     """Tables that a drive with a clock looks up, evenly spaced.
 
-    Tables over position have the shape (runs or 1, tables, points), with their first place and points per metre (runs
-    or 1, 2). Tables over time have that shape too, with their points per second (1,).
+    `places` are tables over position, shape (runs or 1, tables, points); `grid` has their first position and points per
+    metre, (runs or 1, 2). `times` are tables over time, also (runs or 1, tables, points), with their points
+    `per_second`, (1,).
     """
 
     places: np.ndarray
@@ -55,8 +56,9 @@ class Batch(NamedTuple):
 class BatchOptions(NamedTuple):
     """Options of all runs in a batch.
 
-    They are the relative tolerance, the step budget, the two bands of settling [m], the time [s] from which turning
-    points are kept, the sampling interval [s], and a flag, shape (1,), which when set keeps further runs from starting.
+    `budget` is the most steps of a run. `inner` and `outer` [m] are the two bands of settling. `record_from` [s] is the
+    time from which turning points are kept, and `interval` [s] that between samples. Once the flag `cancel`, shape
+    (1,), is set, no further run starts.
     """
 
     rtol: float
@@ -69,10 +71,11 @@ class BatchOptions(NamedTuple):
 
 
 class Results(NamedTuple):
-    """Outputs of the runs of a batch.
+    """Outputs of the n runs of a batch.
 
-    They are statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their count (n,), sampled
-    states with the held numbers (n, samples, states + held), and states with held numbers at the end of the run.
+    They are statistics (n, len(STATISTICS)), status (n,), and turning points (n, capacity) with their count (n,).
+    Samples hold states and the numbers held between samples, (n, samples, states + held); `ends` hold both at the end
+    of the run.
     """
 
     statistics: np.ndarray
@@ -101,10 +104,16 @@ STATISTICS = (
     "inner_before",
     "outer_before",
 )
-"""Names of the statistics of a run: largest force [N], extremes of the deviation in the window [m], last time outside
-each of the two bands [s], steps attempted and rejected, time reached [s], and for each band the longest time [s] to
-enter it at a place that the reference left again (infinite: not before the reference left; 0: no such place). Extremes
-and times are NaN for a drive with a clock; its samples are examined instead."""
+"""Names of the statistics of a run, in the order of their columns.
+
+- Largest force [N], and extremes of the deviation in the window [m].
+- Last time outside each of the two bands [s].
+- Steps attempted and rejected, and time reached [s].
+- For each band, the longest time [s] to enter it at a place that the reference left again. It is infinite if the
+  deviation did not enter before the reference left, and 0 if there is no such place.
+
+Extremes and times are NaN for a drive with a clock; its samples are examined instead.
+"""
 
 
 class Status(IntEnum):

@@ -1,6 +1,6 @@
 """Run many stages of one structure, and return the results chunk by chunk.
 
-Runs are prepared in NumPy, and computed in lanes and threads.
+Runs are prepared in NumPy. Each core then computes several at once, one per lane of a vector register.
 """
 
 from __future__ import annotations
@@ -74,12 +74,12 @@ class Runs:
         return self.results.statistics[:, STATISTICS.index(name)]
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys of the stages of these runs."""
+        """Select the keys of the stages of these runs: `flat` has keys with SI numbers or arrays."""
         return part_of(flat, self.numbers)
 
 
 def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
-    """Return the flat keys of the stages with these numbers."""
+    """Select the stages with these numbers from a mapping of keys to SI numbers or arrays."""
     return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
@@ -88,11 +88,11 @@ def run_chunks(
 ) -> Iterator[Runs]:
     """Run `runs` stages of one structure, in chunks.
 
-    Stages are given as flat keys to SI numbers or arrays of shape (runs,). They start at rest, displaced as the motion
-    says, or from the states `starts`, shape (runs, states). In `starts`, modes with memory may follow the states;
-    otherwise they are derived from the states. In a chunk, runs with many turning points come last. Results do not
-    depend on lanes, threads or chunks. A failed run has a status; the others go on. Raises Exhausted if an allowance
-    does not suffice (see `friso.engine.allowance`).
+    `flat` has the stages' keys, such as "friction.static", with SI numbers or arrays of shape (runs,). They start at
+    rest, displaced as the motion says, or from the states `starts`, shape (runs, states). In `starts`, modes with
+    memory may follow the states; otherwise they are derived from the states. In a chunk, runs with many turning points
+    come last. Results do not depend on how many runs are computed at once. A failed run has a status; the others go on.
+    Raises Exhausted if an allowance does not suffice (see `friso.engine.allowance`).
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
@@ -102,9 +102,9 @@ def run_chunks(
 def prepare(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Batch:
-    """Return the kernel's input for the runs of one chunk.
+    """Make the input of the compiled code for the runs of one chunk.
 
-    They begin in the states `starts`, or as the motion says.
+    They begin in the states `starts`, or as the motion says. `flat` has the stages' keys in SI.
     """
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
@@ -126,18 +126,20 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return initial states held at rest, with masses displaced as the motion says.
+    """Return the initial states of stages at rest, their masses displaced as the motion says.
 
-    Measurements of the masses are displaced too.
+    Filters have settled, and the actuator carries the constant forces.
     """
     return kernel.balanced({**flat, "motion.size": motion.size(flat)}, motion.initial_displacement(flat), runs)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return pieces of the reference, with the start of the window and the end of the run added.
+    """Return pieces of the reference, cut at the start of the window and at the end of the run.
 
-    Pieces that begin after the end are left out. The second result is the place of the window. Runs with the same
-    motion share one row. If the reference stands or moves evenly in the end, the window lies after its last corner.
+    The window is the time over which extremes are taken; it begins after the fraction `window` of the run. Pieces that
+    begin after the end are left out. The second result is the number of the piece that opens the window. Runs with the
+    same motion share one row. If the reference stands or moves evenly in the end, the window lies after its last
+    corner.
     """
     runs = runs if motion.varies(flat) else 1
     pieces = motion.pieces(flat, runs)
@@ -167,7 +169,7 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run the numbered runs.
+    """Run the numbered runs, with `room` for turning points.
 
     Runs with too many turning points are repeated, fewer at a time, with more room for each.
     """
@@ -197,7 +199,7 @@ def _run_with_room(
 
 
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
-    """Run a batch within the allowance, if there is one.
+    """Run a batch within the allowance of work, if there is one.
 
     Each run gets an equal part of the remaining steps. The few runs that need more are repeated with the steps that the
     others left. Raises Exhausted if these are hardly more than the first part.
@@ -233,12 +235,12 @@ def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
 
 
 def _empty_like(results: Results, runs: int) -> Results:
-    """Return empty arrays for `runs` runs, of the sizes of the given results."""
+    """Return empty results for `runs` runs, with as much room as the given results."""
     return empty_results(runs, results.turn_times.shape[1], *results.samples.shape[1:])
 
 
 def options_of(options: RunOptions) -> BatchOptions:
-    """Return the options as the kernel takes them."""
+    """Return the options that the compiled code needs."""
     return BatchOptions(
         rtol=float(options.rtol),
         budget=float(options.budget),
@@ -251,9 +253,9 @@ def options_of(options: RunOptions) -> BatchOptions:
 
 
 def run_batch(kernel: Kernel, batch: Batch, settings: BatchOptions, results: Results, threads: int | None) -> None:
-    """Let threads take the runs of a chunk from a queue, without the interpreter's lock.
+    """Compute the runs of a batch in threads, which take them from a queue, and fill `results`.
 
-    Raises Overtaken if nobody waits for the runs any more.
+    The threads do without the interpreter's lock. Raises Overtaken if nobody waits for the runs any more.
     """
     go_on()
     workers = min(threads or cores_to_use(), -(-len(batch.starts) // LANES))

@@ -1,4 +1,4 @@
-"""Build kernels, and the loops that run them, in the process that fills the cache.
+"""Compile models' code, and the loops that run it, in the process that fills the cache.
 
 `friso.engine.builder` starts that process.
 """
@@ -28,9 +28,9 @@ from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Compile the kernel of a pickled task, or else the driver, into a folder of the cache.
+    """Compile a model's code by a pickled task, or without one the loops that run it.
 
-    Returns the name of the entry.
+    The code goes into a `folder` of the cache. Returns the name of the entry.
     """
     if not task:
         return keep(folder, inspect.getsource(driver), _loops_code)
@@ -51,12 +51,12 @@ def _load(plug_in: PlugIn) -> None:
 
 
 def _loops_code(module: ModuleType) -> bytes:
-    """Return the machine code of the driver."""
+    """Return the machine code of the loops that run any model's code."""
     return object_code(scalar_code.scalar_llvm(module.run, driver_kinds()))
 
 
 def _code(module: ModuleType) -> bytes:
-    """Return the machine code of a kernel's module."""
+    """Return the machine code of the functions in a model's module."""
     functions = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
     return object_code(vector_code.vector_llvm(functions, module.LAYOUT["lanes"]))
 

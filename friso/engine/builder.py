@@ -18,7 +18,7 @@ GARBAGE = 100_000, 50, 100
 
 
 def main(folder: Path) -> None:
-    """Build the requests that arrive."""
+    """Compile the requests that arrive, into a folder of the cache."""
     gc.set_threshold(*GARBAGE)
 
     def built(asked: tuple[str, bytes]) -> str | OSError:

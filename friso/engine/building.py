@@ -55,9 +55,9 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
 
 
 class _Work:
-    """Builds in progress in this process, as many at a time as there are cores.
+    """Compilations in progress in this process, as many at a time as there are cores.
 
-    Each request is built once for all threads that wait for it.
+    Each request is compiled once for all threads that wait for it.
     """
 
     def __init__(self) -> None:
@@ -65,10 +65,10 @@ class _Work:
         self._jobs: dict[CodeRequest, _Job] = {}
 
     def finish(self, requests: list[CodeRequest]) -> None:
-        """Fulfil all requests.
+        """Fulfil all requests, and wait until they are.
 
-        If this ends early, jobs for which nobody else waits are ended; if it is overtaken, jobs already being built go
-        on.
+        If this ends early, jobs for which nobody else waits are ended. If nobody waits for the results any more, jobs
+        already being compiled go on.
         """
         requests = list(dict.fromkeys(requests))
         jobs: list[_Job] = []
@@ -152,10 +152,10 @@ def _wait(jobs: list[_Job]) -> None:
 
 
 class _Job:
-    """A request to build a cache entry, in progress.
+    """A request to compile an entry of the cache, in progress.
 
-    `place` is its rank in the queue, `waiting` the number of waiting threads, `builds` tells whether it is being built,
-    and `given_up` whether it was abandoned.
+    `place` is its rank in the queue, `waiting` the number of waiting threads. `builds` is true while it is compiled,
+    and `given_up` if it was abandoned.
     """
 
     def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
@@ -234,7 +234,7 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Surroundings:
-    """Conditions under which a builder was started: process, cache, places of modules, plug-ins.
+    """Conditions under which a builder was started: process, cache, module folders, plug-ins.
 
     Another builder is needed if they change.
     """

@@ -167,8 +167,9 @@ class Compiled:
 class CodeRequest:
     """Request to compile code.
 
-    It has the full `name`, a `title` for messages, and the task. `build(folder, task)` of its module stores the code in
-    the cache (`keep`) and returns the name of the entry. The request also holds the digests of loaded plug-ins.
+    It has the full `name`, a `title` for messages, and the `task`. `builder` is a module whose `build(folder, task)`
+    stores the code in the cache (`keep`) and returns the name of the entry. The request also holds the digests of
+    loaded plug-ins.
     """
 
     name: str
@@ -179,7 +180,7 @@ class CodeRequest:
 
     @property
     def file(self) -> Path:
-        """Return the file that names the entry."""
+        """Return the file that names the cache entry of this request."""
         asked = (self.name, VERSION, code_digest("equations", "engine"), version("sympy"), environment())
         return cache_folder() / f"{_digest(*asked)}{REQUEST}"
 
@@ -188,11 +189,11 @@ class CodeRequest:
         return FileLock(cache_folder() / f"{self.file.name[:2]}.request-lock", mode=0o600)
 
     def answer(self, name: str) -> None:
-        """Store the name of the entry."""
+        """Store the name of the cache entry that fulfils the request."""
         write_sealed(self.file, name.encode("ascii"))
 
     def entry(self) -> Compiled | None:
-        """Return the intact entry, or None, and record its use."""
+        """Return the cache entry, or None if it is missing or damaged, and record its use."""
         file = self.file
         name = (read_sealed(file) or b"").decode("ascii")
         if not re.fullmatch("[0-9a-f]{24}", name):

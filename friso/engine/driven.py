@@ -39,9 +39,9 @@ class Inputs:
 
     @property
     def segments(self) -> np.ndarray:
-        """Return the pieces of the reference for the engine, (forces, n + 1, 6).
+        """Return the pieces of the reference, with the force, for the engine: (forces, n + 1, 6).
 
-        There is one per sample, and the end.
+        There is one piece per sample, and one for the end. `forces` is 1 for a common force.
         """
         n, force = len(self.reference), np.atleast_2d(self.force)
         rows = np.zeros((len(force), n + 1, 6))
@@ -56,9 +56,9 @@ class Inputs:
 
 @dataclass(frozen=True)
 class DrivenRuns:
-    """States at the samples, (runs, n, states), and held numbers, (runs, n, held).
+    """States at the samples, (runs, n, states), and numbers held in between, (runs, n, held).
 
-    Held numbers keep their values between samples.
+    `numbers` are the numbers of the runs, and `statuses` their outcomes.
     """
 
     numbers: np.ndarray
@@ -70,10 +70,10 @@ class DrivenRuns:
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
-    """Run driven stages of one structure from the states `starts`, in chunks.
+    """Run stages that follow a log, from the states `starts`, in chunks.
 
-    The stages are given as flat keys to SI numbers or arrays of shape (runs,); `starts` has the shape (runs, kept). The
-    states of a failed run are NaN from the failure on, and the run has its status.
+    `flat` has the keys of the stages, of one structure, with SI numbers or arrays of shape (runs,); `starts` has the
+    shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
     """
     count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
     options = RunOptions(
@@ -99,7 +99,7 @@ def run_driven(
 
 
 def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
-    """Return the flat keys of some runs, with a motion as long as the log, and as large [m]."""
+    """Return the keys of some stages, with a motion as long as the log, and of a `size` [m]."""
     part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
     duration = len(inputs.reference) * inputs.sample_time
     return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}

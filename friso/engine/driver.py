@@ -1,7 +1,9 @@
-"""Keep all lanes busy: load runs, serve lanes that need it, refill a lane as its run ends.
+"""Run a model's code: load runs, record what happens in them, replace a run as it ends.
 
-This code is compiled once per machine (`friso.engine.scalar_code`) for models of any size: sizes and row numbers of a
-model are in its `layout`, with the addresses of its step (`friso.engine.layout.Layout`).
+A vector register has several lanes, each of which computes one run. The numbers of all lanes are in a buffer, B, from
+which the model's step reads and to which it writes. This code is compiled once per machine (`friso.engine.scalar_code`)
+for models of any size. Sizes and row numbers of a model are in its `layout`, with the addresses of its step
+(`friso.engine.layout.Layout`).
 """
 
 from math import pi
@@ -23,7 +25,7 @@ FOLLOWED = STATISTICS.index("attempted")
 
 
 def between(B, layout, lane, i, theta):
-    """Return state i of a lane at the fraction theta of the last step."""
+    """Return state number `i` of the run in a lane, at the fraction `theta` of its last step."""
     inner = 0.0
     for m in range(layout.dense_terms - 1, -1, -1):
         inner = B[(layout.dense + m * layout.states + i) * layout.lanes + lane] + theta * inner
@@ -32,7 +34,10 @@ def between(B, layout, lane, i, theta):
 
 
 def reference_at(B, layout, lane, t, order):
-    """Return the reference [m], or its rate [m/s], at a time t after its last corner."""
+    """Return the reference [m] of the run in a lane, at a time `t` [s] after its last corner.
+
+    With `order` 1, return its velocity [m/s].
+    """
     total, k = 0.0, layout.degree
     while k >= order:
         total = total * t / (k - order + 1) + B[(layout.reference + k) * layout.lanes + lane]
@@ -50,21 +55,27 @@ def reference_at(B, layout, lane, t, order):
 
 
 def deviation(B, layout, lane, theta):
-    """Return position minus reference [m] at the fraction theta of the last step."""
+    """Return position minus reference [m] of the run in a lane.
+
+    It is taken at the fraction `theta` of the last step.
+    """
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.position, theta) - reference_at(B, layout, lane, t, 0)
 
 
 def deviation_rate(B, layout, lane, theta):
-    """Return velocity minus reference velocity [m/s] at the fraction theta of the last step."""
+    """Return the rate [m/s] of position minus reference of the run in a lane.
+
+    It is taken at the fraction `theta` of the last step.
+    """
     t = B[ROW.old_time * layout.lanes + lane] + theta * B[ROW.taken * layout.lanes + lane]
     return between(B, layout, lane, layout.velocity, theta) - reference_at(B, layout, lane, t, 1)
 
 
 def find_turn(B, layout, lane, high):
-    """Return the fraction in (0, high) of the step at which the deviation turns.
+    """Return the fraction of a run's last step, up to `high`, at which the deviation turns.
 
-    Bisection finds it, sped up by the secant (Illinois).
+    Bisection finds it, sped up by the secant (Illinois). The run is the one in `lane`.
     """
     low, f_low, f_high = 0.0, deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, high)
     theta, side = high, 0
@@ -85,7 +96,10 @@ def find_turn(B, layout, lane, high):
 
 
 def find_entry(B, layout, lane, high, band):
-    """Return the fraction of the step at which the deviation enters the band, by bisection."""
+    """Return the fraction of a run's last step at which the deviation enters a band [m].
+
+    Bisection finds it, up to the fraction `high`. The run is the one in `lane`.
+    """
     low = 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -97,15 +111,19 @@ def find_entry(B, layout, lane, high, band):
 
 
 def moment(B, layout, lane, theta):
-    """Return the time since the start of the run [s] at the fraction theta of the last step."""
+    """Return the time since the start of a run [s], at the fraction `theta` of its last step.
+
+    The run is the one in `lane`.
+    """
     start = B[ROW.start * layout.lanes + lane] + B[ROW.old_time * layout.lanes + lane]
     return start + theta * B[ROW.taken * layout.lanes + lane]
 
 
 def note_entry(B, layout, lane, row, fraction, start, end, band):
-    """Refine the time at which the deviation last entered the band, within a step.
+    """Refine the time at which a run's deviation last entered a band [m], within its last step.
 
-    `row` is where the time is stored; the deviation came back between `start` and `end`.
+    `row` is where the time is stored. Over the step, up to the `fraction` that counts, the deviation goes from `start`
+    to `end` [m]. Nothing changes if it did not enter.
     """
     if abs(start) > band and abs(end) <= band:
         theta = find_entry(B, layout, lane, fraction, band)
@@ -113,7 +131,10 @@ def note_entry(B, layout, lane, row, fraction, start, end, band):
 
 
 def note_turn(B, layout, lane, fraction, batch, settings, results):
-    """Record the turning point of the deviation inside the step, if there is one."""
+    """Record the turning point of a run's deviation inside its last step, if there is one.
+
+    Only the `fraction` of the step that was accepted counts. The run is the one in `lane`.
+    """
     before, after = deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
         return
@@ -135,10 +156,10 @@ def note_turn(B, layout, lane, fraction, batch, settings, results):
 
 
 def keep_turn(B, layout, lane, kind, time, value, least, results):
-    """Store a maximum (kind 1) or minimum (-1) of a zigzag with legs of at least `least`.
+    """Store a run's turning point: a maximum (`kind` 1) or minimum (-1) of a zigzag.
 
-    If it follows another extremum of its kind, with only smaller swings in between, it replaces that one if it goes
-    beyond. Extrema without room are only counted.
+    Legs of the zigzag are at least `least` [m] long. If the point follows another one of its kind, with only smaller
+    swings in between, it replaces that one if it goes beyond. Points without room are only counted.
     """
     j, count = int(B[ROW.run * layout.lanes + lane]), int(B[ROW.turns * layout.lanes + lane])
     times, values, last = results.turn_times[j], results.turn_values[j], count - 1
@@ -155,20 +176,23 @@ def keep_turn(B, layout, lane, kind, time, value, least, results):
 
 
 def write_held(B, layout, lane, row):
-    """Write the held numbers behind the states."""
+    """Write a run's numbers held between samples into `row`, behind the states."""
     for i in range(layout.held):
         row[layout.states + i] = B[(layout.reference + layout.inputs + i) * layout.lanes + lane]
 
 
 def write_states(B, layout, lane, row):
-    """Write the present states and the held numbers."""
+    """Write a run's present states and the numbers held between samples into `row`."""
     for i in range(layout.states):
         row[i] = B[(layout.x + i) * layout.lanes + lane]
     write_held(B, layout, lane, row)
 
 
 def note_samples(B, layout, lane, fraction, interval, samples):
-    """Write the states at the sampling instants inside the step, from the dense output."""
+    """Write a run's states at the sampling instants inside its last step into `samples`.
+
+    They are interpolated between the step's ends. `fraction` is the part of the step that counts.
+    """
     next_sample = ROW.next_sample * layout.lanes + lane
     if B[next_sample] == np.inf:
         return
@@ -186,12 +210,12 @@ def note_samples(B, layout, lane, fraction, interval, samples):
 
 
 def reference_of(batch, j):
-    """Return the number of the reference of run j, 0 if all runs share one."""
+    """Return the row of the reference of run `j`; it is 0 if all runs share one."""
     return min(j, batch.segments.shape[0] - 1)
 
 
 def enter_segment(B, layout, lane, j, segment, batch):
-    """Start the next piece of the reference, or the last one, which ends the run.
+    """Start the piece of a run's reference with the number `segment`; the last one ends the run.
 
     Pieces without a duration are passed over. One piece opens the window over which the extremes of the deviation are
     taken.
@@ -227,7 +251,10 @@ def enter_segment(B, layout, lane, j, segment, batch):
 
 
 def walk(B, layout, lane, w):
-    """Return where a lane is along the axis of its tables, in points: at a state, or a time."""
+    """Return how far a run is along the axis of some of its tables, in points.
+
+    `w` numbers the quantities over which tables are looked up: some states, and then time.
+    """
     timed = w == layout.place_states.size
     axis = (layout.axis + (AXIS_ROWS if timed else 0)) * layout.lanes + lane
     if timed:
@@ -239,7 +266,10 @@ def walk(B, layout, lane, w):
 
 
 def look_up(B, layout, lane, j, tables):
-    """Look up the table cells of a lane, if the lane has left its old ones."""
+    """Look up tables at the present position and time of run `j`, which is in a lane.
+
+    A cell is the interval between two points of a table. Nothing is looked up anew while the run is in the same cell.
+    """
     for w in range(layout.place_states.size + 1):
         place, cell = walk(B, layout, lane, w), (layout.cell + w) * layout.lanes + lane
         if place >= B[cell] and place <= B[cell] + 1.0:
@@ -255,9 +285,9 @@ def look_up(B, layout, lane, j, tables):
 
 
 def looked_up(layout, j, i, point, tables):
-    """Return one point of table i for run j.
+    """Return the value of table `i` for run `j` at one of its points.
 
-    Tables run over places or over time, and all runs may share one set.
+    Tables are over position or over time, and all runs may share one set.
     """
     if i < layout.places:
         return tables.places[min(j, tables.places.shape[0] - 1), i, point]
@@ -265,7 +295,7 @@ def looked_up(layout, j, i, point, tables):
 
 
 def note_tick(B, layout, lane, settings, results):
-    """Write states and newly held numbers at a sample of the drive's clock."""
+    """Write a run's states and newly held numbers at a sample of its drive's clock."""
     next_sample, samples = ROW.next_sample * layout.lanes + lane, results.samples
     k = int(B[next_sample] / settings.interval + 0.5)
     write_states(B, layout, lane, samples[int(B[ROW.run * layout.lanes + lane])][k])
@@ -273,7 +303,10 @@ def note_tick(B, layout, lane, settings, results):
 
 
 def take_samples(B, layout, batch, settings, results):
-    """Take the sample of every lane that has reached a sampling instant."""
+    """Let the drives of all runs in the buffer take a sample, where one is due.
+
+    Tables are looked up before, and what is to be recorded is written after it.
+    """
     wanting = call_at(layout.locate, B) if layout.clocked else 0
     if wanting:
         for lane in range(layout.lanes):
@@ -287,7 +320,7 @@ def take_samples(B, layout, batch, settings, results):
 
 
 def load_run(B, layout, lane, j, batch, settings):
-    """Load run j into a lane, at its start."""
+    """Load run `j` into a lane of the buffer, at its start."""
     for row in range(layout.rows):
         B[row * layout.lanes + lane] = 0.0
     B[ROW.run * layout.lanes + lane] = j
@@ -310,7 +343,7 @@ def load_run(B, layout, lane, j, batch, settings):
 
 
 def start_clock(B, layout, lane, j, batch):
-    """Take the first sample of a run, whose results act at once or after the delay."""
+    """Let the drive of run `j` take its first sample, with results at once or after the delay."""
     late, tables = batch.clocks[j, 1], batch.tables
     B[ROW.period * layout.lanes + lane] = batch.clocks[j, 0]
     B[ROW.due * layout.lanes + lane] = late
@@ -332,7 +365,7 @@ def start_clock(B, layout, lane, j, batch):
 
 
 def start_run(B, layout, lane, j, batch, settings, results):
-    """Load run j and write its first sample."""
+    """Load run `j` into a lane, and write its first sample."""
     load_run(B, layout, lane, j, batch, settings)
     next_sample = ROW.next_sample * layout.lanes + lane
     B[next_sample] = np.inf
@@ -343,7 +376,7 @@ def start_run(B, layout, lane, j, batch, settings, results):
 
 
 def idle(B, layout, lane):
-    """Keep a lane without a run at rest, while the other lanes go on."""
+    """Keep a lane that has no run at rest, while the other lanes go on."""
     B[ROW.run * layout.lanes + lane] = -1.0
     B[ROW.stop * layout.lanes + lane] = np.inf
     B[ROW.record_from * layout.lanes + lane] = np.inf
@@ -355,7 +388,10 @@ def idle(B, layout, lane):
 
 
 def answer(B, layout, lane, batch, settings, results):
-    """Record the lane's last step; at the end of a segment of the reference, go to the next."""
+    """Record the last step of the run in a lane.
+
+    At the end of a piece of the reference, the run goes on to the next.
+    """
     fraction, j = B[ROW.fraction * layout.lanes + lane], int(B[ROW.run * layout.lanes + lane])
     if fraction == 0.0:
         return
@@ -369,10 +405,10 @@ def answer(B, layout, lane, batch, settings, results):
 
 
 def next_segment(B, layout, lane, j, batch):
-    """Go to the next piece of the reference.
+    """Let the run in a lane go to the next piece of its reference.
 
-    If the reference leaves a place at which it stood, the time that the run took to settle there is stored, if it is
-    the longest so far.
+    If the reference leaves a place at which it stood, the time that the run took to settle there may be stored: the
+    longest such time is kept.
     """
     stood, now = stands(B, layout, lane), B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
     enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
@@ -387,7 +423,7 @@ def next_segment(B, layout, lane, j, batch):
 
 
 def stands(B, layout, lane):
-    """Tell whether the reference stands still in the present segment of the lane."""
+    """Tell whether the reference of the run in a lane stands still at present."""
     for k in range(1, layout.degree + 1):
         if B[(layout.reference + k) * layout.lanes + lane] != 0.0:
             return False
@@ -398,7 +434,7 @@ def stands(B, layout, lane):
 
 
 def look_inside(B, layout, lane, fraction, batch, settings, results):
-    """Record entries into the bands and turning points in the lane's last step."""
+    """Record when the run in a lane entered a band, or turned, in its last step."""
     start, end = deviation(B, layout, lane, 0.0), deviation(B, layout, lane, fraction)
     note_entry(B, layout, lane, ROW.inner_exit, fraction, start, end, settings.inner)
     note_entry(B, layout, lane, ROW.outer_exit, fraction, start, end, settings.outer)
@@ -406,7 +442,7 @@ def look_inside(B, layout, lane, fraction, batch, settings, results):
 
 
 def outcome(B, layout, lane, batch, settings):
-    """Return how the lane's run has ended, or that it continues."""
+    """Return how the run in a lane has ended (see `Status`), or that it continues."""
     if B[ROW.segment * layout.lanes + lane] >= batch.segments.shape[1] - 1:
         return DONE
     if B[ROW.attempted * layout.lanes + lane] >= settings.budget:
@@ -419,7 +455,7 @@ def outcome(B, layout, lane, batch, settings):
 
 
 def hand_over(B, layout, lane, results):
-    """Write the statistics of the lane's run."""
+    """Write the statistics and the final states of the run in a lane into the results."""
     j = int(B[ROW.run * layout.lanes + lane])
     results.turn_counts[j] = int(B[ROW.turns * layout.lanes + lane])
     write_states(B, layout, lane, results.ends[j])
@@ -436,7 +472,7 @@ def hand_over(B, layout, lane, results):
 
 
 def refill(B, layout, lane, queue, batch, settings, results):
-    """Begin the next run of the queue in a lane; return whether there was one."""
+    """Begin the next run of the queue in a lane; tell whether there was one."""
     runs = batch.starts.shape[0]
     j = take_next(queue) if settings.cancel[0] == 0 else runs
     if j >= runs:
@@ -446,7 +482,10 @@ def refill(B, layout, lane, queue, batch, settings, results):
 
 
 def run(B, layout, queue, batch, settings, results):
-    """Run this thread's share of the queue in lanes, and write the results."""
+    """Compute runs of the queue, several at once, until it is empty; write the results.
+
+    This is one thread's share of a batch.
+    """
     busy = 0
     for lane in range(layout.lanes):
         if refill(B, layout, lane, queue, batch, settings, results):

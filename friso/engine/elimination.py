@@ -1,7 +1,8 @@
-"""Write Gaussian elimination of a matrix with known zeros as straight-line code.
+"""Write Gaussian elimination of a matrix with many zeros as code without loops.
 
-Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order decides how many operations there are,
-and how long each waits for others; it is searched, starting from Markowitz's rule.
+It is known which entries are zero. Pivots stay on the diagonal, which 1/(gamma h) makes large enough. Their order
+decides how many operations there are, and how long an operation waits for others; it is searched, starting from
+Markowitz's rule.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ MULTIPLY, DIVIDE = 4, 13
 """Latency of a fused multiply-add and of a division, in cycles, on current x86-64 processors."""
 
 WORK = 0.5
-"""Cycles of one more vector operation that nothing waits for (two units work side by side)."""
+"""Processor clocks of a vector operation that nothing waits for; two work side by side."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,11 @@ class Elimination:
 
 
 def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
-    """Eliminate a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal, symbolically.
+    """Write the elimination of a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal.
 
-    Rows not in `diagonal` have only the common entry ``diagonal`` on the diagonal, whose inverse is ``inverse``. The
-    pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves` solutions
-    cheaper.
+    Rows not in `diagonal` have the variable ``diagonal``, 1/(gamma h), on the diagonal; the variable ``inverse`` is its
+    inverse. The pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves`
+    solutions cheaper.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)
@@ -67,7 +68,7 @@ def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: 
 
 
 def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
-    """Return diagonal pivots, the one that causes the fewest products first."""
+    """Return the order of the pivots: always the one that causes the fewest products first."""
     pattern, left, order = set(nonzero), set(range(size)), []
     while left:
         rows = {k: [i for i in left if i != k and (i, k) in pattern] for k in left}
@@ -80,9 +81,9 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 
 
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
-    """Return the estimated cycles of a factorisation and `solves` solutions.
+    """Estimate the processor clocks of a factorisation and `solves` solutions.
 
-    They are the longest chain of waiting, and a part of every operation.
+    The estimate is the longest chain of operations that wait for each other, plus some time for every operation.
     """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0
@@ -109,7 +110,7 @@ def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], s
 
 
 def _write(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int]) -> Elimination:
-    """Return the elimination in the given order."""
+    """Write the elimination with its pivots in the given order."""
     pattern, untouched = set(nonzero), set(order) - diagonal
     code: list[str] = []
     lower: list[MatrixEntry] = []

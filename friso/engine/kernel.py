@@ -1,4 +1,4 @@
-"""Represent the kernel of a structure, compiled on first use and then cached."""
+"""Represent the kernel of a structure: its compiled equations and step, cached on disk."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ _CALLS = re.compile(r"\b(?:exp|gaussian|power|sqrt|tanh|sine|log|clipped)\(")
 
 @dataclass(frozen=True)
 class Kernel:
-    """A generated module with its machine code and the loops that run it.
+    """The compiled code of a structure's equations, with the loops that run it.
 
-    It has the names of states, of numbers held between samples, of parameters and outputs, its layout with the
-    addresses of the machine code, and its source.
+    `module` has the names of states, of numbers held between samples, of parameters and outputs. `layout` says where
+    numbers are in the buffer, with the addresses of the machine code.
     """
 
     module: ModuleType
@@ -60,7 +60,7 @@ class Kernel:
 
     @cached_property
     def work(self) -> float:
-        """Return the work of a step of a run, counted in operations.
+        """Return the work of one step of a run, counted in operations of its source.
 
         It is equal on every machine.
         """
@@ -68,11 +68,11 @@ class Kernel:
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
     def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
-        """Run the runs of this thread's share of a batch, and write the results."""
+        """Compute this thread's share of a batch of runs, and write the results."""
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:
-        """Return room for all rows, aligned to 64 bytes.
+        """Return room for the numbers of all runs computed at once, aligned to 64 bytes.
 
         A register that straddles two cache lines takes twice as long.
         """
@@ -120,12 +120,12 @@ class Kernel:
 
     @property
     def full_state(self) -> tuple[str, ...]:
-        """Return the names of all values of a run at an instant: states, then held numbers."""
+        """Return the names of all values of a run at an instant: states, held numbers and modes."""
         return self.states + self.held
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """Return the numbers of the kinks that are modes that remember."""
+        """Return the numbers of the kinks, where derivatives jump, that are modes with memory."""
         return self.module.SWITCHES
 
     @property
@@ -151,23 +151,25 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """Return states and held numbers in steady motion after all transients.
+        """Return states and held numbers in a steady motion after all transients.
 
-        The shape is (runs, initial_size). `flat` and the numbers of the motion may be arrays of shape (runs,).
+        The shape is (runs, initial_size). `flat` has the stages' keys in SI; they and the numbers of the motion may be
+        arrays of shape (runs,).
         """
         return self.settled_at(self.values(flat, runs), steady, runs)
 
     def balanced(self, flat: dict[str, Any], displacement: Any, runs: int) -> np.ndarray:
         """Return the states of stages held at a displacement [m], at rest, (runs, initial_size).
 
-        The actuator carries the constant forces, by the integral of its controller, or by the error without one.
+        The actuator carries the constant forces, by the integral of its controller, or by an error without one. `flat`
+        has the stages' keys in SI.
         """
         values = self.values(flat, runs)
         steady = Steady(0.0, displacement, force=carrying_force(flat))
         return self.settled_at(values, self._with_error(values, steady), runs)
 
     def _with_error(self, values: list[np.ndarray], steady: Steady) -> Steady:
-        """Return a steady motion with the error at which a controller without an integral exerts its force."""
+        """Add to a steady motion the error at which a controller without integral gives its force."""
         (stiffness,) = self.module.stiffness(values)
         if not np.any(steady.force) or self.having(Role.INTEGRAL) or not np.all(stiffness):
             return steady
@@ -175,13 +177,17 @@ class Kernel:
         return steady._replace(error=steady.error + error, position=steady.position - error)
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion after all transients, from values of the parameters."""
+        """Return states in a steady motion after all transients, shape (runs, initial_size).
+
+        `values` are those of the parameters.
+        """
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion with integrals that hold `steady.force` alone, from parameter values.
+        """Return states in a steady motion whose integrals hold only a force, `steady.force`.
 
-        The other states add their own force.
+        The other states add their own force. `values` are those of the parameters, and the shape is (runs,
+        initial_size).
         """
         resting = self.settled_at(values, self._with_error(values, steady)._replace(force=0.0), runs)
         if integrals := self.having(Role.INTEGRAL):
@@ -194,10 +200,10 @@ class Kernel:
         return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
-        """Return the side of each kink on which runs are, 1 beyond and 0 before, shape (kinks, ...).
+        """Return on which side of each kink runs are: 1 beyond and 0 before it, shape (kinks, ...).
 
-        `full` is the full state, or the states alone, (..., ). Modes with memory are taken from the full state; from
-        states alone they are those in which a run begins.
+        At a kink derivatives jump. `full` is the full state, or the states alone, (..., ). Modes with memory are taken
+        from the full state; from states alone they are those in which a run begins.
         """
         sides = self.module.surfaces(full[: len(self.states)], time, reference, values)
         modes = np.zeros((len(self.kinks), *full.shape[1:]))
@@ -208,7 +214,7 @@ class Kernel:
         return modes
 
     def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
-        """Append to starts the modes with memory in which runs begin.
+        """Append to initial states the modes with memory in which runs begin, if they lack them.
 
         `starts` has the shape (runs, initial_size), or is complete already.
         """
@@ -218,7 +224,7 @@ class Kernel:
         return np.hstack([starts, modes.T])
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
-        """Return the parameters of each run [SI], each of shape (runs,), from flat keys."""
+        """Return the parameters of each run [SI], each of shape (runs,), from the stages' keys."""
         rows = np.empty((len(self.parameters), runs))
         for row, name in zip(rows, self.parameters, strict=True):
             row[:] = flat[name]
@@ -234,9 +240,9 @@ class Kernel:
 
 @dataclass(frozen=True)
 class KernelRequest:
-    """Request for a kernel: the structure, the solver's method and the number of lanes.
+    """Request for a kernel: a structure, the solver's method, and how many runs to do at once.
 
-    It may have variational equations, whose deviations may also be `along` keys of the stage file.
+    With `variational`, small deviations from a run are integrated too; they may also be `along` keys of the stage file.
     """
 
     structure: KernelForm
@@ -247,14 +253,14 @@ class KernelRequest:
 
     @property
     def sections(self) -> tuple[type[Section], ...]:
-        """Return the classes of the stage file's sections that declare equations of their own."""
+        """Return the classes of stage-file sections that contribute equations: friction, controller."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         controller = form.controller if isinstance(form, Structure) else None
         return (friction_law(form.friction), *((controller.section,) if controller else ()))
 
     @property
     def title(self) -> str:
-        """Describe the form in a few words."""
+        """Describe what is compiled in a few words, for messages."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         words = [form.title if isinstance(form, Structure) else f"{form.friction} friction"]
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
@@ -280,16 +286,16 @@ def kernel(
     lanes: int = LANES,
     along: tuple[str, ...] = (),
 ) -> Kernel:
-    """Return the kernel for a form, with a step method and a number of lanes.
+    """Return the compiled code of a structure, with a step method and so many runs at once.
 
-    A variational one also integrates a small deviation of every state, and optionally `along` keys of the stage file
-    (`friso.equations.variational`).
+    With `variational`, it also integrates a small deviation of every state, and optionally of keys of the stage file,
+    `along` (`friso.equations.variational`).
     """
     return kernels([KernelRequest(structure, variational, method, lanes, along)])[0]
 
 
 def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:
-    """Return several kernels, compiled side by side where necessary."""
+    """Return several kernels, which are compiled side by side where they are missing."""
     requests = list(requests)
     missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
     if missing:
@@ -350,9 +356,10 @@ def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
-    """Return empty arrays for the results of runs, with turning points and samples.
+    """Return empty arrays for the results of runs.
 
-    Outputs are kept at samples and at turning points.
+    There is room for `capacity` turning points and `samples` samples of each. `outputs` counts the values kept at
+    samples and at the end of a run.
     """
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
@@ -366,7 +373,7 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
 
 
 def driver_kinds() -> list[CompiledKind]:
-    """Return the kinds of the driver's arguments."""
+    """Return the types of the arguments of the loops that run any kernel."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)
     settings = BatchOptions(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))

@@ -58,7 +58,7 @@ class ArrayKind:
 
 @dataclass(frozen=True)
 class RecordKind:
-    """Named tuples with these fields."""
+    """Named tuples whose `fields` have these names and kinds."""
 
     fields: tuple[tuple[str, CompiledKind], ...]
 

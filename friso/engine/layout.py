@@ -1,6 +1,6 @@
-"""Lay out the numbers of all lanes in one flat float64 buffer.
+"""Lay out the numbers of all runs computed at once in one flat float64 buffer.
 
-The buffer has one row after another, and a row has its lanes side by side.
+The buffer has one row after another. A row has a number of each run, in its lane, side by side.
 """
 
 from __future__ import annotations
@@ -109,12 +109,11 @@ holds the time since which the reference stands."""
 
 @dataclass(frozen=True)
 class Layout:
-    """Layout of the buffer in which the driver stores the runs of a model.
+    """Layout of the buffer with the runs that are computed at once.
 
     `walks` are the quantities over which tables are looked up: states, and time. For each, a `cell` is the interval
     between two points of its tables, with a `base` and a `slope` for every table. `piece_before` has the length and the
-    inputs of the previous piece of the reference, because a sample may lie there whose command acts only after the
-    corner.
+    inputs of the previous piece of the reference. A sample may lie there whose command acts only after the corner.
     """
 
     states: int

@@ -1,4 +1,4 @@
-"""Write a model's module: its kernel, and functions that prepare and read its runs.
+"""Write a model's module: its step, and functions that prepare and read its runs.
 
 A module needs no SymPy to run, so a warm start loads neither the equations nor their derivatives.
 """
@@ -37,7 +37,10 @@ _LOG = "from friso.engine.simd_math import log"
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
-    """Return the source of the module for `model`, stepping by the method of `tableau`."""
+    """Return the source of the module for `model`, which steps by the method of `tableau`.
+
+    The step is written for `lanes` runs at once.
+    """
     writer = StepWriter(model, tableau)
     straight = (writer.source(), writer.locate_source(), writer.update_source())
     head = _HEAD.format(title=title, method=tableau.name)
@@ -48,7 +51,7 @@ def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES)
 
 
 def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
-    """Return the model's names, and the layout of its buffer."""
+    """Write the model's names, and the layout of its buffer."""
     places = _places(model, model.stage)
     layout = _sizes(model, writer) | writer.layout.first_rows
     layout |= {"lanes": lanes, "position": places[0], "velocity": places[1]}
@@ -91,9 +94,9 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
 
 
 def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
-    """Return indices of states that a sampled drive measures, and of those in its tables.
+    """Return indices of states: those that a sampled drive measures, and those in its tables.
 
-    Also returns, for each table, the index of the state over which it is looked up.
+    Also returns, for each table, the index of the quantity over which it is looked up.
     """
     clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
@@ -125,7 +128,10 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    """Return a function with this head; expressions with cases are evaluated once."""
+    """Write a function with this head, which returns the expressions.
+
+    Cases that occur in several expressions are evaluated once.
+    """
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)
     shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}

@@ -1,6 +1,7 @@
 """Find the first zero of a kink's surface inside a step, as straight-line code.
 
-Values at the ends and thirds of the step fix a cubic. `friso.engine.vector_code` compiles the code.
+At a kink derivatives jump; its surface is a function of the states that is 0 there. Values at the ends and thirds of
+the step fix a cubic. `friso.engine.vector_code` compiles the code.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Compile plain Python loops over numbers and arrays.
 
-The driver of the lanes and the scan of turning points are loops with branches, of a few hundred lines. A general
-compiler of Python needs seconds for them, because it has to infer types. Here types follow from the arguments of a
-call.
+The loops that run models, and the scan of turning points, have branches and a few hundred lines. A general compiler of
+Python needs seconds for them, because it has to infer types. Here types follow from the arguments of a call.
 
 The language has functions of whole numbers, float64 numbers, truth values, arrays, and named tuples of these. It has
 assignments, arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, and `return` of a number. Imported
@@ -57,22 +56,22 @@ def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) ->
 
 
 def take_next(queue: Any) -> Any:
-    """Take the number at the head of a queue, which no other thread then gets."""
+    """Take the number at the head of a queue, and count it on; no other thread gets that number."""
     queue[0] += 1
     return queue[0] - 1
 
 
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
-    """Call a function written by `friso.engine.vector_code`; return the bits of its lanes.
+    """Call the step at an `address`, compiled for several runs at once; return a bit for each.
 
-    `address` is the function's address.
+    `friso.engine.vector_code` wrote it. A bit is set if the function returned true for that run.
     """
     raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class _Value:
-    """A number."""
+    """A number in the code being written, with its type."""
 
     value: Any
     kind: NumberKind
@@ -84,7 +83,7 @@ class _Value:
 
 @dataclass(frozen=True)
 class _ArrayValue:
-    """An array: its address and shape."""
+    """An array in the code being written: its address and shape."""
 
     data: ir.Value
     shape: tuple[ir.Value, ...]
@@ -97,7 +96,7 @@ class _ArrayValue:
 
 @dataclass(frozen=True)
 class _RecordValue:
-    """A named tuple at an address, unchanged while the code runs."""
+    """A named tuple in the code being written, at an address and unchanged while the code runs."""
 
     words: ir.Value
     kind: RecordKind
@@ -115,7 +114,7 @@ class _RecordValue:
         raise TypeError(f"not in the language of plain loops: no field {name}")
 
     def _field(self, builder: Any, place: int, kind: CompiledKind) -> Any:
-        """Load a field of the record at a place among its words."""
+        """Write the loading of a field of the named tuple, from a position among its words."""
         if isinstance(kind, RecordKind):
             return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
         parts = []
@@ -134,16 +133,16 @@ def _value(parts: Sequence[ir.Value], kind: CompiledKind) -> Any:
 
 
 class _Writer:
-    """Writer of functions, each once for the kinds of its arguments."""
+    """Writer of LLVM code for Python functions, each once for given types of its arguments."""
 
     def __init__(self, module: ir.Module) -> None:
         self.module = module
         self._written: dict[tuple[Any, ...], tuple[ir.Function, NumberKind | None]] = {}
 
     def call(self, builder: Any, function: Callable[..., Any], arguments: list[Any]) -> Any:
-        """Call a function and return its result, None without one.
+        """Write the call of a function; return its result, None without one.
 
-        All functions return a word, whatever the kind of their result.
+        All functions return a word, whatever the type of their result.
         """
         kinds = tuple(argument.kind for argument in arguments)
         if (function, kinds) not in self._written:
@@ -159,7 +158,7 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
-        """Write a function as LLVM code, for arguments of the given kinds."""
+        """Write a function as LLVM code, for arguments of the given types."""
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
@@ -200,7 +199,7 @@ _COMPARISONS: dict[type[ast.AST], str] = {
 
 
 class _Frame(ast.NodeVisitor):
-    """Writer of the statements and expressions of one function, for arguments of given kinds.
+    """Writer of LLVM code for the body of one function, given the types of its arguments.
 
     A variable with a number is a place in memory, which LLVM turns into registers. A variable with an array or a named
     tuple is another name for it. Compile-time values stay Python objects until they meet a number.
@@ -246,7 +245,7 @@ class _Frame(ast.NodeVisitor):
         self._assign(node.target, self._operate(node.op, self.visit(node.target), self.visit(node.value)))
 
     def _assign(self, target: ast.expr, value: Any) -> None:
-        """Assign a value to a name, to several names, or to an element of an array."""
+        """Write the assignment of a value to a name, to several names, or to an element of an array."""
         if isinstance(target, ast.Tuple):
             for part, element in zip(target.elts, value, strict=True):
                 self._assign(part, element)
@@ -263,7 +262,7 @@ class _Frame(ast.NodeVisitor):
             self.generic_visit(target)
 
     def _bind(self, name: str, value: Any) -> None:
-        """Bind a variable to a value; a number is copied into it."""
+        """Write the assignment of a value to a variable; a number is copied into it."""
         if isinstance(value, _ArrayValue | _RecordValue):
             self._scope[name] = value
             return
@@ -403,7 +402,10 @@ class _Frame(ast.NodeVisitor):
         return _Value(loaded, INT if array.kind.dtype == "int64" else FLOAT)
 
     def _element(self, array: _ArrayValue, node: ast.expr) -> ir.Value:
-        """Return the address of an element, or of the first element with this first index."""
+        """Write the address of an array's element at some indices.
+
+        With the first index alone, it is the first element that has this index.
+        """
         index = node.elts if isinstance(node, ast.Tuple) else [node]
         if len(index) not in (1, len(array.shape)):
             self.generic_visit(node)
@@ -560,9 +562,9 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._builder.call(code, [buffer.data, *operands]), INT)
 
     def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
-        """Convert two numbers to one kind: float64 if either is.
+        """Convert two numbers to one type: float64 if either is.
 
-        Returns both, and the kind.
+        Returns both, and the type.
         """
         first, second = self._number(left), self._number(right)
         kind = FLOAT if FLOAT in (first.kind, second.kind) else INT
@@ -571,7 +573,7 @@ class _Frame(ast.NodeVisitor):
         return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
-        """Convert a number to a kind; whole numbers and truth values may become float64."""
+        """Convert a number to a type; whole numbers and truth values may become float64."""
         if not isinstance(value, _Value):
             own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):
@@ -586,14 +588,14 @@ class _Frame(ast.NodeVisitor):
         raise TypeError(f"not in the language of plain loops: {value.kind.name} where {kind.name} is expected")
 
     def _truth(self, value: Any) -> ir.Value:
-        """Tell whether a number is not 0."""
+        """Write the test whether a number is not 0."""
         number = self._number(value)
         return number.value if number.kind == TRUTH else self._compare("!=", number, 0).value
 
 
 @dataclass(frozen=True)
 class _Variable:
-    """Place in a frame where a variable's number is stored."""
+    """A variable with a number: where it is stored, and its type."""
 
     room: ir.Value
     kind: NumberKind

@@ -41,7 +41,7 @@ def _authenticator(path: Path, content: bytes) -> bytes:
 
 @cache
 def _secret(folder: Path) -> bytes:
-    """Return the secret of a folder.
+    """Return the user's secret in a folder, which shows that friso wrote the files there.
 
     A new one is made if there is none, or if others can have read or written it.
     """

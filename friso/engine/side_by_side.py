@@ -25,9 +25,9 @@ _PATIENCE = 0.1
 
 @dataclass(frozen=True)
 class _Beside:
-    """Tasks that run side by side with the present one: their number and their jobs.
+    """Tasks that run side by side: how many there are, and their jobs.
 
-    It also holds the group from which they were started.
+    `about` is the group of tasks from one of which they were started.
     """
 
     tasks: int
@@ -47,7 +47,7 @@ _BESIDE: ContextVar[_Beside | None] = ContextVar("beside", default=None)
 def cores_to_use() -> int:
     """Return how many cores a batch of runs may take now.
 
-    It is all of them, or a share while other tasks run. Fewer threads keep more of their lanes busy.
+    It is all of them, or a share while other tasks run. With fewer threads, each has more runs to compute at once.
     """
     beside = _BESIDE.get()
     return beside.cores if beside else usable_cores()
@@ -93,7 +93,10 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
 
 
 def both(first: Callable[[], _T], second: Callable[[], _Other]) -> tuple[_T, _Other]:
-    """Run two tasks side by side, as `side_by_side` does, and return both results."""
+    """Run two tasks side by side, and return both results.
+
+    An error of one task stops the other at its next batch of runs, and is raised.
+    """
     tasks: list[Callable[[], Any]] = [first, second]
     one, other = side_by_side(tasks)
     return one, other

@@ -33,12 +33,19 @@ MOST_SAMPLES = 20_000_000
 def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
     """Simulate a stage's own motion, and return its time response.
 
-    Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and its
-    shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far as the
-    stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage as TOML
-    text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration; samples are
-    taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has NaN from
-    there on, and the reason in `status`. Raises InputError for a sample time and a tolerance that is not usable.
+    Variables over `time` [s] are, as far as the stage has them:
+
+    - reference, position, velocity and error;
+    - force and its shares (the controller's terms);
+    - cart position and velocity;
+    - joint deflection and force;
+    - friction force and bristle deflection.
+
+    The extrema of position minus reference are over `turning_point`. Each variable has `units`, those of the stage's
+    kind of axis, and a `long_name`. `attrs` hold the stage as TOML text, rtol, status, steps and rejected steps.
+    `sample_time` [s] is by default a 20 000th of the duration; samples are interpolated between the solver's steps. A
+    run that fails has NaN from there on, and the reason in `status`. Raises InputError for a sample time or a tolerance
+    that is not usable.
     """
     flat = stage.flat()
     duration = flat["motion.duration"]
@@ -61,7 +68,10 @@ def checked_interval(interval: float, duration: float) -> float:
 
 
 def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
-    """Return the model's outputs from its states, shape (states, samples), at the times [s]."""
+    """Return the model's outputs, such as forces, at times [s], each of shape (samples,).
+
+    They are computed from states, shape (states, samples). `flat` has the stage's keys in SI.
+    """
     parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
     rows = motion.pieces(flat, 1)[0]
     active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
@@ -72,9 +82,9 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
-    """Return the model's outputs as variables over "time".
+    """Return the model's outputs, such as forces, as variables over "time", with their units.
 
-    They are computed from states, shape (states, samples), at the times [s].
+    They are computed from states, shape (states, samples), at the times [s]. `flat` has the stage's keys in SI.
     """
     arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {

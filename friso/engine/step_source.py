@@ -1,7 +1,8 @@
-"""Write one Rosenbrock step of a model as straight-line code for one lane.
+"""Write one Rosenbrock step of a model as code without branches, for one run.
 
-`friso.engine.vector_code` compiles the code. Modes (on which side of each kink) are held during a step, so that the
-right-hand side is smooth. A step that crosses a kink is accepted up to the crossing, which the dense output locates.
+`friso.engine.vector_code` compiles it for several runs at once, one in each lane of a register. Kinks are where
+derivatives jump. Modes (on which side of each kink) are held during a step, so that the right-hand side is smooth. A
+step that crosses a kink is accepted up to the crossing, which the dense output locates.
 """
 
 from __future__ import annotations
@@ -19,28 +20,41 @@ from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 
 THIRDS = (1 / 3, 2 / 3)
-"""Places inside a step at which kinks are evaluated; with both ends they fix a cubic."""
+"""Fractions of a step at which kinks (where derivatives jump) are evaluated.
+
+With both ends they fix a cubic.
+"""
 
 
 POINTS = ("near", "third", "far", "last")
-"""Names of a kink's surface at the start, the thirds and the end of a step."""
+"""Names of the values of a kink's surface at the start, the thirds and the end of a step.
+
+At a kink derivatives jump.
+"""
 
 HYSTERESIS = 3e-3
-"""Distance beyond a kink, over the tolerance, at which it counts as crossed. A lane that has crossed a kink is then
-clear of it, and rounding noise crosses nothing."""
+"""Distance beyond a kink, over the tolerance, at which it counts as crossed.
+
+A run that has crossed a kink is then clear of it, and rounding noise crosses nothing. At a kink derivatives jump.
+"""
 
 
 SAFETY = 0.77
 """Factor on the step that the error estimate would allow. Larger values reject more steps than they save."""
 
 AFTER_KINK = 0.25
-"""Factor on the proposed step after a kink, behind which the motion may be much faster."""
+"""Factor on the proposed step after a kink (where derivatives jump).
+
+Behind it the motion may be much faster.
+"""
 
 
 WIDE = 3.0
-"""Distance of a step's start from a kink, in widths of the narrow peak about the kink. A step from farther off that
-crosses the kink and ends beyond the peak, or on this side again, is repeated up to the kink, because all of its stages
-may lie beyond the peak."""
+"""Distance of a step's start from a kink, in widths of the narrow peak about the kink.
+
+A step from farther off may pass over the peak, because all of its stages may lie beyond. So such a step is repeated up
+to the kink if it crosses the kink and ends beyond the peak, or on this side again. At a kink derivatives jump.
+"""
 
 ROUNDING = 2e-15
 """Least hysteresis over the terms of a surface, nine units in their last place."""
@@ -55,7 +69,10 @@ NO_SWING = 1e-6
 """Rate, over the velocity's tolerance, below which a deviation turns only by rounding."""
 
 HAPPENED = "entered | turned | (now >= next_sample)"
-"""Condition under which a lane needs attention, besides the end of a piece of the reference."""
+"""Condition under which the loops around the step must look at a run.
+
+Another one is the end of a piece of the reference.
+"""
 
 DIVERGED = 1e6
 """Deviation at which a run ends as diverged, in length scales of the motion."""
@@ -70,7 +87,7 @@ class Block:
         self._named = dict(zip(named, reduced, strict=True))
 
     def code(self, suffix: str, rename: Rename) -> list[str]:
-        """Return assignments to the names, each followed by the suffix."""
+        """Write assignments of the expressions to their names, each followed by the suffix."""
         inner = {symbol: f"{symbol}{suffix}" for symbol, _ in self._shared}
 
         def named(symbol: sp.Symbol) -> str:
@@ -81,7 +98,7 @@ class Block:
 
 
 class StepWriter:
-    """Writer of the code of one model's step by one method."""
+    """Writer of the code of one model's step, by one method."""
 
     def __init__(self, model: Model, tableau: Tableau) -> None:
         self.model, self.tableau = model, tableau
@@ -122,17 +139,26 @@ class StepWriter:
         self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
-        """Return a block that computes the jumps of states at a kink, and the states' indices."""
+        """Return a block that computes the jumps of states at a kink, and the states' indices.
+
+        At a kink derivatives jump, or states.
+        """
         named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
         return Block(named, self.constants), [self._index[x] for x in jumps]
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
-        """Return the magnitude of a surface for the scales of the states."""
+        """Return the magnitude of a kink's surface while states have their usual magnitudes.
+
+        At a kink derivatives jump; its surface is a function that is 0 there.
+        """
         sizes = (sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
         return sum(sizes, start=sp.S.Zero)
 
     def _rounding(self, surface: sp.Expr) -> sp.Expr:
-        """Return the magnitude of the terms of a surface, which determines its rounding error."""
+        """Return the magnitude of the terms of a kink's surface, which decides its rounding error.
+
+        At a kink derivatives jump; its surface is a function that is 0 there.
+        """
         terms = (sp.Abs(sp.diff(surface, x)) * sp.Abs(x) for x in self.model.symbols)
         return sum(terms, start=sp.S.Zero)
 
@@ -155,13 +181,13 @@ class StepWriter:
 
     @property
     def switches(self) -> tuple[int, ...]:
-        """Return the numbers of the kinks that are modes that remember."""
+        """Return the numbers of the kinks, where derivatives jump, that are modes with memory."""
         return tuple(map(self.model.kinks.index, self.model.switches))
 
     def source(self) -> str:
-        """Return a lane's function `step(B, rtol, inner, outer, budget)`.
+        """Write the function `step(B, rtol, inner, outer, budget)` for one run.
 
-        It tells whether the lane needs attention.
+        It returns true if something happened in the step that the loops around it must record.
         """
         body = [
             *self._load(),
@@ -186,10 +212,10 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """Return a lane's function `locate(B)`, or nothing without a clock.
+        """Write the function `locate(B)` for one run; nothing for a model without a clock.
 
-        It tells whether the lane has `ticked`, whether a table cell has been `left`, and whether a sample is to be
-        `noted`.
+        It finds out whether a table cell has been `left`, and whether a sample is to be `noted`, if the drive has
+        `ticked`. It returns true for either.
         """
         if not self.model.clock:
             return ""
@@ -205,7 +231,7 @@ class StepWriter:
         return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
-        """Return the code for each quantity's distance from its table cell's beginning, in cells."""
+        """Write how far each quantity is from the beginning of its cell in a table, in cells."""
         lines = []
         for w, x in enumerate(self._walks):
             first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
@@ -214,9 +240,9 @@ class StepWriter:
         return lines
 
     def update_source(self) -> str:
-        """Return a lane's function `update(B)`.
+        """Write the function `update(B)` for one run.
 
-        It looks up tables and, if the lane has `ticked`, sets the held numbers from the last sample, and the time of
+        It looks up tables and, if the drive has `ticked`, sets the held numbers from the last sample, and the time of
         the next tick. Modes with memory stay as at the beginning of the step.
         """
         clock, name = self.model.clock, self._in_buffer()
@@ -241,7 +267,7 @@ class StepWriter:
         return _function("update", "B", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
-        """Return the code that finds the piece of the reference in which the sample was taken.
+        """Write the code that finds the piece of the reference in which the sample was taken.
 
         It is the previous piece if a corner came in between.
         """
@@ -251,7 +277,7 @@ class StepWriter:
         return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
 
     def _in_buffer(self) -> Rename:
-        """Return names for the inputs of a sample, most of which are in the buffer."""
+        """Return the names in the code for what a sample depends on, most of it in the buffer."""
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
@@ -266,7 +292,7 @@ class StepWriter:
         return f"B[{self._rows[block] + i}]"
 
     def _load(self) -> list[str]:
-        """Write the code that loads states, modes and constants of a lane from the buffer."""
+        """Write the code that loads a run's states, modes and constants from the buffer."""
         named = {
             "x": [f"x{i}" for i in range(self.size)],
             "tolerance": [f"tol{i}" for i in range(self.size)],
@@ -279,7 +305,7 @@ class StepWriter:
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """Return the code for the next step, at most to the reference's corner or the next tick.
+        """Write the choice of the next step, at most to the reference's corner or the next tick.
 
         The last two steps before that point are made equal.
         """
@@ -294,7 +320,7 @@ class StepWriter:
         ]
 
     def _edge(self) -> list[str]:
-        """Return the code for the latest end of the step.
+        """Write the latest possible end of the step.
 
         A corner and a tick coincide if they are equal within rounding.
         """
@@ -327,7 +353,7 @@ class StepWriter:
         return lines
 
     def _stage_rates(self, stage: int) -> list[str]:
-        """Write a stage: its state, and the right-hand side there."""
+        """Write the state at a stage of the method, and the right-hand side there."""
         if stage == 0:
             return []
         row, before = self.tableau.a[stage - 1], self.tableau.a[stage - 2] if stage > 1 else ()
@@ -359,16 +385,17 @@ class StepWriter:
         return [f"d{m}_{i} = {self._sum(row, i)}" for m, row in rows for i in range(self.size)]
 
     def _between(self, i: int, theta: str) -> str:
-        """Return state i at the fraction theta of the step."""
+        """Write state `i` at the fraction `theta` of the step."""
         inner = f"d{len(self.tableau.dense) - 1}_{i}"
         for m in range(len(self.tableau.dense) - 2, -1, -1):
             inner = f"d{m}_{i} + {theta} * ({inner})"
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """Return the code that finds the first crossing of a kink: `fraction`, 1 if there is none.
+        """Write the search for the first crossing of a kink (where derivatives jump) in the step.
 
-        `astray` tells that a kink's mode is wrong.
+        It is at the fraction `fraction` of the step, 1 if there is none. `astray` is true if a run is on the other side
+        of a kink than its mode says.
         """
         lines = []
         for point, theta in enumerate(THIRDS):
@@ -437,7 +464,10 @@ class StepWriter:
         ]
 
     def _passed_over(self) -> list[str]:
-        """Write the test for whether the step may have `passed_over` a narrow peak about a kink."""
+        """Write the test for whether the step may have `passed_over` a narrow peak.
+
+        Such a peak may lie about a kink, where derivatives jump.
+        """
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
@@ -447,7 +477,7 @@ class StepWriter:
         return lines
 
     def _jump(self) -> list[str]:
-        """Write the jumps of states and modes at the kinks just crossed.
+        """Write the jumps of states and modes at the kinks just crossed, where derivatives jump.
 
         Modes with memory change one after the other, because several may change at one instant: the result of the first
         is the input of the second.
@@ -471,7 +501,7 @@ class StepWriter:
         return [*lines, "root16 = sqrt(root8)", f"factor = {SAFETY!r} / (root16 * sqrt(root16))"]
 
     def _statistics(self) -> list[str]:
-        """Write the largest force, and whether the lane needs attention."""
+        """Write the largest force, and whether something happened that must be recorded."""
         return [
             *self._followed.code("_n", self._rename("n", "t_n")),
             "force_peak = max(force_peak, abs(force_s))",
@@ -534,7 +564,7 @@ class StepWriter:
         return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in unwritten]
 
     def _store_step(self) -> list[str]:
-        """Write the storage of the step, from which states inside it are interpolated."""
+        """Write the storage of the step's ends and dense output, for interpolation inside it."""
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
         lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
         for m in range(len(self.tableau.dense)):
@@ -543,6 +573,6 @@ class StepWriter:
 
 
 def _function(name: str, arguments: str, lines: list[str]) -> str:
-    """Return a function for one lane, whose column of the buffer is B."""
+    """Return a function for one run, whose column of the buffer is B."""
     body = "".join(f"    {line}\n" for line in lines)
     return f"def {name}({arguments}):\n{body}"

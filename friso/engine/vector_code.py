@@ -1,8 +1,8 @@
-"""Write straight-line Python, made for one lane, as vector instructions for all lanes.
+"""Compile straight-line Python, written for one run, for several runs at once.
 
 The step of a model is a thousand lines without a branch. A general compiler would infer the type of every variable in
-them, and find out that the lanes do not depend on each other. Here each operation becomes one instruction on a vector
-with an element per lane. This takes a fraction of the time, and does not rely on a vectoriser.
+them, and find out that runs do not depend on each other. Here each operation becomes one instruction on a vector, which
+has a number of each run in its lane. This takes a fraction of the time, and does not rely on a vectoriser.
 
 The language has assignments, arithmetic, comparisons and tuples. It also has conditional expressions, both sides of
 which are computed, and `for` over a known range. Functions written in it are inlined.
@@ -34,12 +34,12 @@ CACHE_LINE = 64
 
 
 def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
-    """Compile functions to LLVM code under given names, for `lanes` lanes at once.
+    """Compile functions to LLVM code under given names, for `lanes` runs at once.
 
-    An original `(B, *numbers)` works on a column of numbers B[row]. The compiled function does so in every lane of a
-    flat float64 buffer, in which the lanes of a row lie side by side; the numbers are common to all lanes. It takes the
-    buffer's address and the numbers, and returns a whole number whose bit k is set if the original would return true
-    for lane k.
+    An original `(B, *numbers)` works on a column of numbers B[row]. The compiled function does so for every run in a
+    flat float64 buffer. There the numbers of all runs, one in each lane, lie side by side in a row. The `numbers` are
+    common to all runs. It takes the buffer's address and the numbers, and returns a whole number. Bit k is set if the
+    original would return true for lane k.
     """
     module = ir.Module()
     for name, function in functions.items():
@@ -48,7 +48,7 @@ def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.M
 
 
 def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int) -> None:
-    """Add a function to an LLVM module, written as vector instructions for `lanes` lanes."""
+    """Add a function to an LLVM module, as vector instructions for `lanes` runs at once."""
     numbers = [_FLOAT.element] * (len(syntax(function).args.args) - 1)
     signature = ir.FunctionType(_SIGNED.element, [ir.PointerType(_FLOAT.element), *numbers])
     code = ir.Function(module, signature, name)
@@ -105,7 +105,7 @@ class _Vector:
 
 @dataclass(frozen=True)
 class _Column:
-    """The rows of a buffer."""
+    """The rows of the buffer, which have a number of every run, side by side."""
 
     builder: Any
     data: ir.Value
@@ -125,7 +125,7 @@ class _Column:
 
 
 class _Writer:
-    """Writer of the instructions of functions."""
+    """Writer of the LLVM instructions of functions, for several runs at once."""
 
     def __init__(self, builder: Any, lanes: int) -> None:
         self.builder, self.lanes = builder, lanes
@@ -142,7 +142,7 @@ class _Writer:
         return None
 
     def vector(self, value: Any, kind: _Kind) -> _Vector:
-        """Return a value as a vector; a number is copied to all lanes."""
+        """Return a value as a vector; a number is copied to the lanes of all runs."""
         if isinstance(value, _Vector):
             if value.kind is not kind:
                 raise TypeError(f"{value.kind} where {kind} is expected")

@@ -42,8 +42,8 @@ OF_RATED = 2**50
 class AsBuilt:
     """Structure of a stage with its real drive.
 
-    `delay_samples` is the delay in whole samples, `current_loop` tells whether the current loop lags, and
-    `velocity_samples` is the number of samples over which a drive without a filter differentiates the position.
+    `delay_samples` is the delay in whole samples. `current_loop` is true if the current loop lags. `velocity_samples`
+    is the number of samples over which a drive without a filter differentiates the position.
     """
 
     structure: Structure
@@ -53,13 +53,13 @@ class AsBuilt:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
-        """Return the form of a stage's drive, given as flat keys."""
+        """Return the structure of a stage with its drive; `flat` has the stage's keys in SI."""
         samples = round(flat.get("drive.velocity_samples", 1.0))
         return cls(structure(anywhere(flat)), whole_samples(flat), "drive.current_bandwidth" in flat, samples)
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
-    """Return the delay of a drive in whole samples; `drive.late` is the remainder."""
+    """Return the delay of a drive in whole samples, rounded down; `drive.late` is the remainder."""
     return int(flat.get("drive.delay", 0.0) / flat["drive.sample_time"] * (1 + 1e-9) + 1e-9)
 
 
@@ -76,7 +76,7 @@ NEUTRAL: Mapping[str, float] = {
     "cable.stiffness": 0.0,
     "cable.drag": 0.0,
 }
-"""Flat keys and values of a drive without any imperfection."""
+"""Keys of the drive and its cables, with the values [SI] for a drive without imperfections."""
 
 
 def as_built(form: AsBuilt) -> Model:
@@ -110,7 +110,7 @@ def as_built(form: AsBuilt) -> Model:
 
 
 def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
-    """Return a kink whose levels vary along the rail.
+    """Return a kink, where derivatives jump, with friction levels that vary along the rail.
 
     The levels without the rail's factors decide on which side of the kink a run begins.
     """
@@ -125,7 +125,10 @@ def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
 
 
 def _shaken(part: Any) -> sp.Expr:
-    """Return the derivative of a state in a frame that moves with the floor."""
+    """Return the derivative of a state in a frame that moves with the floor.
+
+    Only velocities change: the floor's acceleration is subtracted.
+    """
     from friso.equations.component import Role, state
 
     return part.derivative - (state(FLOOR) if part.role == Role.VELOCITY else 0)
@@ -171,9 +174,9 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
-    """Return the encoder's reading [m], the commanded force [N], and the held numbers.
+    """Return the encoder's reading [m], the commanded force [N], and numbers the drive keeps.
 
-    Held numbers are kept until the next sample.
+    These numbers are kept from one sample to the next.
     """
     from dataclasses import replace
 

@@ -11,9 +11,9 @@ from friso.stage.controllers import KIND, controller_of
 
 
 def bandwidth(flat: Mapping[str, Any]) -> Any:
-    """Return the bandwidth [Hz] that a controller's keys state.
+    """Return the bandwidth [Hz] that a controller's keys state, such as its crossover.
 
-    None if they state none, as for a controller by gains, or without a controller.
+    The result is None if they state none, as for a controller by gains, or without a controller.
     """
     key = controller_of(flat).bandwidth_key if KIND in flat else None
     return None if key is None else flat[key]
@@ -31,13 +31,13 @@ def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     """Return stages whose whole controller is faster by a factor, bandwidth included.
 
-    All poles and zeros of the controller are multiplied by the factor.
+    All poles and zeros of the controller are multiplied by the factor. `flat` has the stages' keys in SI.
     """
     return {**flat, **sped_up(flat, factor)}
 
 
 def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return the keys that change, with new values, when a controller becomes faster."""
+    """Return the keys that change, with new values, when a controller is faster by a factor."""
     controller = controller_of(flat)
     powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
@@ -69,6 +69,6 @@ class _Numbers:
 
 
 def proportional_stiffness(flat: Mapping[str, Any]) -> float:
-    """Return the proportional stiffness of the loop of a stage given as flat keys [N/m]."""
+    """Return the proportional stiffness of a stage's loop [N/m]; `flat` has its keys in SI."""
     controller = controller_of(flat)
     return float(controller.stiffness(_Numbers(flat), controller.variant(flat)))

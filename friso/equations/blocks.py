@@ -43,7 +43,10 @@ class Loop:
 
 
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
-    """Return the sign (1, -1 or 0) of the first of some rates that is not 0."""
+    """Return the sign (1, -1 or 0) of the first of some rates that is not 0.
+
+    The rates are velocity, acceleration and so on, so it is the direction in which a motion goes on.
+    """
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
     return Piecewise(*cases, (sp.S.Zero, True))
 
@@ -62,11 +65,11 @@ class Controller:
 
 @dataclass(frozen=True)
 class Signal:
-    """A signal in a controller.
+    """A signal in a controller, which can be added to others and multiplied by gains.
 
-    It has its value, the magnitude below which it does not matter, and its value and rate in a steady motion that has
-    lasted (in terms of `STEADY`). It may also have its rate in continuous time, and its value at the sample before.
-    Signals can be added, and multiplied by gains.
+    `value` is what it is now, and `scale` the magnitude below which it does not matter. `settled` and `settled_rate`
+    are its value and rate in a steady motion that has lasted, in terms of `STEADY`. `rate` is its rate in continuous
+    time, and `before` its value at the sample before, if known.
     """
 
     value: sp.Expr
@@ -110,10 +113,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured inputs of a controller.
+    """Measured inputs of a controller, as signals.
 
-    They are error and position [m], and the position behind the velocity, from one encoder or from two. Of the
-    reference they are velocity [m/s], acceleration [m/s^2], direction (1, -1, 0) and jerk [m/s^3].
+    From encoders come error and position [m], and `rated`: the position from which the velocity is taken, perhaps of
+    another encoder. Of the reference come velocity [m/s], acceleration [m/s^2], direction (1, -1, 0) and jerk [m/s^3].
     """
 
     error: Signal
@@ -126,7 +129,7 @@ class Measured:
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
-    """Return the signals of a loop, scaled by a length [m] and a rate [1/s]."""
+    """Make signals of a controller's inputs, scaled by a length [m] and a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
@@ -167,7 +170,10 @@ class Blocks(ABC):
         yield
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
-        """Pass a signal to a faster loop, which holds the value until the slower loop runs again."""
+        """Pass a signal from a slower loop to a faster one, which holds it between slow samples.
+
+        Without sample times the signal is unchanged.
+        """
         return signal
 
     def key(self, name: str) -> sp.Symbol:
@@ -203,7 +209,7 @@ class Blocks(ABC):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """Return gain/s, or gain/(s + leak), of a signal.
+        """Return a signal integrated: gain/s of it, or gain/(s + leak).
 
         The gain is positive, and the controller's force rises with the output. At the force limit the integrator
         follows the anti-windup. An integrator whose own output reaches `limit` stops. A drive integrates by `rule`,
@@ -221,7 +227,7 @@ class Blocks(ABC):
 
     @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """Return the signal clamped to plus and minus a limit."""
+        """Return the signal clamped to plus and minus a limit; `name` names the clamp."""
 
     @abstractmethod
     def dead_zone(self, error: Signal) -> Signal:
@@ -229,16 +235,16 @@ class Blocks(ABC):
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the standstill gains where the error is small.
+        """Return the force with the gains for standstill while the error is small.
 
-        The integrals keep the force that they had.
+        `total` is the force with the usual gains. The integrals keep the force that they had.
         """
 
     @abstractmethod
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return a constant force towards the reference.
+        """Return a constant force towards the reference, which acts while the reference rests.
 
-        It acts while the reference rests and the error is not small.
+        It acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
         """
 
     @abstractmethod
@@ -283,7 +289,7 @@ class Blocks(ABC):
 
 
 class _Row(dict[str, sp.Symbol]):
-    """The keys of one row in an array of tables, given as parameters."""
+    """The keys of one row in an array of tables, such as a filter's, as symbols."""
 
     def __init__(self, place: str) -> None:
         super().__init__()
@@ -308,7 +314,7 @@ class Demand:
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
-    """Return the demand of a controller for its measured inputs."""
+    """Return the force that a controller demands for its measured inputs."""
     error, settings = seen.error, form.settings
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)
@@ -339,10 +345,10 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the integrals in a steady motion for which the force equals that of `STEADY`.
+    """Return the states of integrators in a steady motion in which the controller gives a force.
 
-    The innermost integral, which is made last, supplies the force; the others are 0. `force` is the controller's own
-    force in the steady motion, in terms of the integrals.
+    This is the force of `STEADY`. The innermost integral, which is made last, supplies it; the others are 0. `force` is
+    the controller's own force in the steady motion, in terms of the integrals.
     """
     if not integrals:
         return {}

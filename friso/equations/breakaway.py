@@ -23,7 +23,7 @@ Force = Callable[[Mapping[str, Any]], Any]
 def breakaway(flat: Mapping[str, Any]) -> Any:
     """Return the largest friction force at rest [N] of guide and motor together.
 
-    The result is an array if keys are arrays. A law that declares no such force counts as 0.
+    The result is an array if keys are arrays. A friction law without such a force counts as 0.
     """
     return sum(_breakaway(keys) for keys in _tables(flat))
 
@@ -40,7 +40,7 @@ def sliding(flat: Mapping[str, Any]) -> Any:
 def least_breakaway(flat: Mapping[str, Any]) -> Any:
     """Return the force [N] at which the guide breaks away in its weaker direction.
 
-    Laws declare the mean break-away force of both directions. A bias force on the cart is subtracted.
+    Friction laws give the mean break-away force of both directions. A bias force on the cart is subtracted.
     """
     forward, back = _slow(flat)
     total = forward + back
@@ -49,7 +49,10 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the flat keys as the guide's friction law sees them, and as the motor's does."""
+    """Return the keys for the guide's friction law, and for the motor's under the guide's names.
+
+    The second is left out if there is no friction at the motor.
+    """
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]
 
@@ -66,9 +69,9 @@ def _breakaway(flat: Mapping[str, Any]) -> Any:
 
 
 def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the forces [N] of one law against the slowest motion, forward and back.
+    """Return the friction forces [N] of one law in the slowest motion, forward and back.
 
-    They are 0 if the law declares no steady friction.
+    They are positive, and 0 if the law has no steady friction.
     """
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:
@@ -96,7 +99,7 @@ def _steady_of(name: str, variant: Hashable) -> Force | None:
 
 
 def _compiled(expression: sp.Expr) -> Force:
-    """Return an expression as a function of the values of its symbols by name."""
+    """Compile an expression into a function of a mapping: its symbols' names to their values."""
     import sympy as sp
 
     expression = sp.sympify(expression)

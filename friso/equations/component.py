@@ -1,7 +1,7 @@
 """Define the building blocks of the model in SymPy symbols: states, kinks and outputs.
 
-A parameter is a symbol named after its stage-file key. So its value is looked up in the flat stage, and a derivative
-with respect to it is a sensitivity to that key.
+Kinks are where derivatives jump. A parameter is a symbol named after its stage-file key. So its value is looked up
+among the stage's keys, and a derivative with respect to it is a sensitivity to that key.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ class State:
 
 @dataclass(frozen=True)
 class Held:
-    """A number that is held between samples.
+    """A number that a drive holds between samples.
 
-    It has an expression for its next value, in terms of the held values just before, a role, and its value in a steady
-    motion that has lasted (in terms of `STEADY`).
+    `update` is its next value, in terms of the held values just before. `settled` is its value in a steady motion that
+    has lasted, in terms of `STEADY`.
     """
 
     symbol: sp.Symbol
@@ -70,7 +70,7 @@ TICK = sp.Symbol("tick", real=True)
 
 @dataclass(frozen=True)
 class Clock:
-    """The instants at which a drive samples: every `period` [s].
+    """The instants at which a drive samples, every `period` [s], and what it looks up there.
 
     Results of a sample take effect `late` [s] after it, less than a period; then the held numbers change. `seen` are
     states measured at the sample itself, under separate names. `places` are tables looked up by the position in a
@@ -92,14 +92,14 @@ class Clock:
 class gaussian(sp.Function):
     """A normally distributed number, determined by a seed and the index of a sample.
 
-    It does not depend on lane or thread (`friso.engine`).
+    It does not depend on which runs are computed together, or on how many threads (`friso.engine`).
     """
 
     nargs = 2
 
 
 class sine(sp.Function):
-    """The function sin(2 pi x) of a number of turns x (`friso.engine`)."""
+    """The function sin(2 pi x) of a number of turns x, which the engine computes itself."""
 
     nargs = 1
 
@@ -109,7 +109,7 @@ class sine(sp.Function):
 
 
 class clipped(sp.Function):
-    """A number limited to plus and minus the second argument (`friso.engine`).
+    """A number limited to plus and minus the second argument.
 
     SymPy's own minimum and maximum take minutes to compare long expressions.
     """
@@ -153,18 +153,24 @@ class Kink:
         return self.surface if self.starts is None else self.starts
 
     def beginning(self, sides: Mapping[Any, Any]) -> Kink:
-        """Return the kink with conditions in place of other kinks' sides, for the start of a run."""
+        """Return the kink with conditions in place of other kinks' `beyond`, for the start of a run.
+
+        `sides` has these conditions by symbol.
+        """
         return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
-        """Return the kink under another name.
+        """Return the kink (where derivatives jump) under another name.
 
         Expressions that contain the old `beyond` must be given the new one.
         """
         return replace(self, name=name)
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
-        """Return the kink with some expressions replaced by others."""
+        """Return the kink (where derivatives jump) with expressions replaced by others.
+
+        `values` maps old to new ones.
+        """
         surface, narrow = (cast(sp.Expr, expression.xreplace(values)) for expression in (self.surface, self.narrow))
         starts = None if self.starts is None else cast(sp.Expr, self.starts.xreplace(values))
         return Kink(self.name, surface, narrow=narrow, starts=starts)
@@ -201,7 +207,7 @@ class Switch(Kink):
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 
     def with_values(self, values: Mapping[Any, Any]) -> Switch:
-        """Return the switch with some expressions replaced by others."""
+        """Return the switch with expressions replaced by others: `values` maps old to new ones."""
         enter, leave, begins = (
             cast(sp.Expr, expression.xreplace(values)) for expression in (self.enter, self.leave, self.begins)
         )
@@ -223,7 +229,10 @@ class Output:
 
 @dataclass(frozen=True)
 class Component:
-    """A part of the model, with its states, kinks and outputs."""
+    """A part of the model, such as a joint, with its states, kinks and outputs.
+
+    Kinks are where derivatives jump.
+    """
 
     states: tuple[State, ...] = ()
     kinks: tuple[Kink, ...] = ()

@@ -30,12 +30,15 @@ DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
 
 
 def factor_key(level: str) -> str:
-    """Return the flat key of the factor by which [conditions] multiply "static" or "coulomb"."""
+    """Return the key of the factor with which [conditions] multiply one kind of friction.
+
+    `level` is "static" or "coulomb".
+    """
     return f"{CONDITIONS}.{level}_factor"
 
 
 def has_conditions(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage given as flat keys has a table [conditions]."""
+    """Tell whether a stage has a table [conditions]; `flat` has its keys."""
     return factor_key("static") in flat
 
 
@@ -45,9 +48,9 @@ def load_follows(flat: Mapping[str, Any]) -> bool:
 
 
 def friction_level(name: str, conditions: bool) -> sp.Expr:
-    """Return static or Coulomb friction [N], times its factor if the stage has [conditions].
+    """Return static or Coulomb friction [N] in symbols, with its factor if there are conditions.
 
-    It is valid at constant speed of the reference.
+    It is valid at constant speed of the reference. `name` is "static" or "coulomb".
     """
     from friso.equations.component import key
 
@@ -56,7 +59,10 @@ def friction_level(name: str, conditions: bool) -> sp.Expr:
 
 
 def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
-    """Return a friction level [N] of a stage given as flat keys, under its operating conditions."""
+    """Return static or Coulomb friction [N] of a stage under its operating conditions.
+
+    `name` is "static" or "coulomb", and `flat` has the stage's keys in SI.
+    """
     return flat[f"friction.{name}"] * flat.get(factor_key(name), 1.0)
 
 
@@ -73,10 +79,10 @@ def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
 
 @register_derivation(CONDITIONS)
 def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys of the friction factors that follow from [conditions], numbers or arrays.
+    """Compute the friction factors that follow from [conditions], by key, as numbers or arrays.
 
-    They are valid at the stage's place on the rail. Raises InputError for a correlation length that is tiny against the
-    range of places.
+    They are valid at the stage's place on the rail. `flat` has the stage's keys in SI. Raises InputError for a
+    correlation length that is tiny against the range of places.
     """
     own = {key.removeprefix(f"{CONDITIONS}."): flat[key] for key in flat if key.startswith(f"{CONDITIONS}.")}
     loaded = 1 - own["load_share"] + own["load_share"] * own["load"]
@@ -91,9 +97,9 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of a machine that moves along its rail.
+    """Return a stage's keys for motion along its rail, instead of at one place of it.
 
-    Its friction factors leave out the factors of a single place.
+    Its friction factors then leave out the factors of that place.
     """
     if not has_conditions(flat):
         return dict(flat)
@@ -102,7 +108,7 @@ def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _deviates(flat: Mapping[str, Any]) -> bool:
-    """Tell whether friction deviates at random along the rail."""
+    """Tell whether friction deviates at random along the rail; `flat` has the keys of the rail."""
     return any(np.any(flat.get(f"rail.{level}_deviation", 0.0)) for level in LEVELS)
 
 

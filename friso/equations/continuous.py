@@ -80,15 +80,16 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _per_error(value: sp.Expr) -> sp.Expr:
-    """Return the derivative of a value with respect to the error, at fixed reference."""
+    """Return the derivative of a value in steady motion by the error, at fixed reference."""
     return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
 
 
 @dataclass(frozen=True)
 class ForceLimit:
-    """The force limit of a controller.
+    """The force limit of a controller, in continuous time.
 
-    It has the limited force [N], its kinks, the difference to the demand [N], and what integrators do at the limit.
+    `force` [N] is the limited force, `cut` [N] its difference to the demand, and `limit` [N] the limit. `kinks` are
+    where the limit begins to act, so that derivatives jump. `anti_windup` is what integrators do there.
     """
 
     limit: sp.Expr
@@ -107,10 +108,10 @@ class ForceLimit:
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator.
+    """An integrator in continuous time.
 
-    It has a state, an input (also in a steady motion), a magnitude and an output. Its output may have a limit, and it
-    may leak at a rate.
+    `symbol` is its state, `integrand` its input, `settled` that input in a steady motion, and `output` what it adds to
+    the force. The output may have a `limit`, and the state may `leak` at a rate [1/s].
     """
 
     symbol: sp.Symbol
@@ -195,13 +196,19 @@ class Continuous(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, rate=changes)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """Return the limited signal, with one kink at each limit."""
+        """Clip a signal to plus or minus `limit`.
+
+        Each limit becomes a kink, named after `name`, at which derivatives jump. The result has no known rate.
+        """
         value, kinks = _clamped(signal.value, limit, name)
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
 
     def dead_zone(self, error: Signal) -> Signal:
-        """Return the error less the deadband, with a kink at each end of the deadband."""
+        """Reduce an error by the deadband, to 0 within it.
+
+        Each end of the deadband is a kink, where derivatives jump.
+        """
         band = self.key("error_deadband")
         inside = Kink("error_deadband", band**2 - error.value**2)
         self.kinks.append(inside)
@@ -214,7 +221,10 @@ class Continuous(Blocks):
         return replace(error, value=value, settled=settled, rate=rate)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the standstill gains, with a kink at each end of the window."""
+        """Return the force with the gains for standstill while the error is within the window.
+
+        `total` is the force with the usual gains. Each end of the window is a kink, where derivatives jump.
+        """
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))
         inside = Kink("standstill", window**2 - error.value**2)
         self.kinks.append(inside)
@@ -229,7 +239,10 @@ class Continuous(Blocks):
         return replace(total, value=value, settled=resting, rate=None)
 
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return the force that pushes towards the reference, with a kink at each end of the window."""
+        """Return the force that pushes towards the reference while the error exceeds the window.
+
+        It acts while the reference rests. Each end of the window is a kink, where derivatives jump.
+        """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
@@ -243,7 +256,10 @@ class Continuous(Blocks):
         return Signal(amplitude * sine(frequency * TIME), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _pausing(self, error: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
-        """Return a factor that is 0 where integrals pause and 1 elsewhere, and its kinks."""
+        """Return a factor that is 0 where integrals pause and 1 elsewhere, and its kinks.
+
+        Kinks are where derivatives jump: at both ends of the deadband.
+        """
         if not self.settings.deadband:
             return sp.S.One, ()
         within = self.key("integral_deadband") ** 2 - error**2
@@ -253,15 +269,18 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """Return a mode for the sign of the error; integrals restart at 0 where the sign changes."""
+        """Return a mode with memory for the sign of the error, where integrals restart at a change.
+
+        They restart at 0. There is no mode if no integral restarts.
+        """
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
 
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
         """Return all states and kinks, including what integrators do at limits.
 
-        Integrators follow the anti-windup where the demand exceeds its bound, and stop where their own output reaches a
-        limit.
+        Kinks are where derivatives jump. Integrators follow the anti-windup where the demand exceeds its `bound`, and
+        stop where their own output reaches a limit.
         """
         steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
@@ -297,7 +316,7 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """Return the limited outputs of an integral, each with its limit and the limit's name."""
+        """Return the outputs of an integral that have a limit, with the limit and its name."""
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
@@ -306,23 +325,27 @@ class Continuous(Blocks):
 
 
 def _clamped(value: sp.Expr, limit: sp.Expr, name: str) -> tuple[sp.Expr, tuple[Kink, ...]]:
-    """Return a value clamped to its limit, and the kinks at the upper and the lower limit."""
+    """Return a value clamped to plus and minus a limit, and its kinks, where derivatives jump."""
     upper = Kink(f"{name}_upper", value - limit)
     lower = Kink(f"{name}_lower", -value - limit)
     return value + upper.beyond * (limit - value) - lower.beyond * (limit + value), (upper, lower)
 
 
 def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...]:
-    """Return the kinks beyond which an integrator has stopped, a narrow band outside the limits."""
+    """Return the kinks beyond which an integrator has stopped, a narrow band outside its limits.
+
+    Kinks are where derivatives jump.
+    """
     upper, lower = limits
     band = UNWINDING_BAND * limit
     return Kink(f"{name}_upper", upper.surface - band), Kink(f"{name}_lower", lower.surface - band)
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return how far a limit stops an integrator: 0 runs, 1 is stopped.
+    """Return how far a limit stops an integrator: 0 if it runs, 1 if it is stopped.
 
-    The limit stops it where the value is beyond the limit and would be driven further.
+    The limit stops it where the value is beyond one of the `limits` and would be driven further. Beyond `far` it has
+    stopped altogether. `winding` tells in which direction it is driven.
     """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):

@@ -22,7 +22,7 @@ IMPULSE = "impulse"
 
 @dataclass(frozen=True)
 class Dragged(Imposed):
-    """A friction law on a body that follows a reference, and the variant of its equations."""
+    """Structure of a friction law on a body that follows a reference."""
 
 
 def dragged(form: Dragged) -> Model:

@@ -47,9 +47,9 @@ def driven(form: Driven) -> Model:
 
 
 def _sampled(form: Driven) -> Control:
-    """Return the controller as a drive computes it.
+    """Return the controller as a drive computes it, sampled at the corners of the reference.
 
-    It samples at the corners of the reference.
+    At these corners the log has its samples.
     """
     from dataclasses import replace
 

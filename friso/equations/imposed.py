@@ -31,14 +31,20 @@ With the harmonic, force = Re(harmonic exp(2 pi i time)) and position = amplitud
 
 @dataclass(frozen=True)
 class Imposed:
-    """A friction law on a body with an imposed motion, and its variant (see `Structure`)."""
+    """Structure of a friction law on a body with an imposed motion.
+
+    `friction_variant` is any further choice of the law (see `Structure`).
+    """
 
     friction: str
     friction_variant: Hashable
 
 
 def imposed_form(flat: Mapping[str, Any]) -> Imposed:
-    """Return the law of a stage given as flat keys. Raises InputError for a law without a force."""
+    """Return the structure of a stage's friction law under imposed motion; `flat` has its keys.
+
+    Raises InputError for a law without a force.
+    """
     name = flat["friction.model"]
     law = friction_law(name)
     if law.declare is FrictionSection.declare:
@@ -82,9 +88,9 @@ def imposed(form: Imposed) -> Model:
 
 
 def _per_period(inner: State, period: sp.Expr) -> State:
-    """Return a state of the law with its rate per period.
+    """Return a state of the law with its derivative per period instead of per second.
 
-    States that are lengths get the motion as their scale.
+    States that are lengths get the size of the motion as their scale, if it is smaller.
     """
     import sympy as sp
 

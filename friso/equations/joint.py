@@ -16,9 +16,10 @@ from friso.equations.structure import JointForm
 def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pulls: bool) -> tuple[sp.Expr, Component]:
     """Return the force of the joint on the cart [N], and its kinks, for a deflection [m].
 
-    "locked": cart and stage are coupled by the limiter alone. "touching": the stroke is zero, so that the limiter
-    always touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A limiter that cannot pull
-    lets go where its damping would outweigh its stiffness.
+    Kinks are where derivatives jump. "locked": cart and stage are coupled by the limiter alone. "touching": the stroke
+    is zero, so that the limiter always touches. "free": the limiter touches where abs(deflection) exceeds the stroke. A
+    limiter that cannot pull lets go where its damping would outweigh its stiffness. `rate` [m/s] is that of the
+    deflection.
     """
     contact = key("joint.limiter_stiffness") * deflection + key("joint.limiter_damping") * rate
     leaves = key("joint.stiffness") * deflection + key("joint.damping") * rate
@@ -47,6 +48,6 @@ def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr, limiter_pul
 def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:
     """Return the kinks at which the limiter of a free joint touches, ahead and behind.
 
-    `deflection` [m] is that of the joint.
+    At a kink derivatives jump. `deflection` [m] is that of the joint.
     """
     return stops(deflection, key("joint.stroke"), "stroke")

@@ -22,11 +22,14 @@ class Body:
 
     @classmethod
     def named(cls, prefix: str, mass: sp.Expr) -> Body:
-        """Return a body of this mass [kg], its states named with a prefix."""
+        """Make a body of this mass [kg]; a prefix names the symbols of its position and velocity."""
         return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
 
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
-        """Return the states of the body under the sum of forces [N], by Newton's second law."""
+        """Return the body's position and velocity as states under a force [N], by Newton's law.
+
+        `length` [m] and `rate` [1/s] scale them.
+        """
         return (
             State(self.position, self.velocity, "m", length, Role.POSITION, STEADY.position),
             State(self.velocity, force / self.mass, "m/s", length * rate, Role.VELOCITY, STEADY.velocity),
@@ -36,8 +39,8 @@ class Body:
 def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
     """Return the force of the stage on the parasitic mass [N], by a spring and a damper.
 
-    The spring and the damper represent the first internal mode. `parasitic.frequency` is the frequency at which the two
-    parts of the stage oscillate against each other (design.md, section 1).
+    They represent the joint's first internal mode. `parasitic.frequency` is the frequency at which the two parts of the
+    stage oscillate against each other (design.md, section 1).
     """
     reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
     omega = 2 * sp.pi * key("parasitic.frequency")
@@ -56,9 +59,9 @@ def position_outputs(prefix: str, name: str, body: Body) -> Component:
 
 
 def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
-    """Return the two kinks, ahead and behind, at which bodies touch.
+    """Return the two kinks, ahead and behind, at which bodies touch and derivatives jump.
 
-    They have a clearance `reach` [m] to either side.
+    The bodies have a clearance `reach` [m] to either side; `name` names the kinks.
     """
     return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
 

@@ -1,4 +1,7 @@
-"""A stage's equations, assembled from parts: states, right-hand side, kinks, outputs."""
+"""Assemble a stage's equations from parts: states, right-hand side, kinks, outputs.
+
+Kinks are where derivatives jump.
+"""
 
 from __future__ import annotations
 
@@ -47,10 +50,9 @@ class Model:
     - `breakaway` [N]: largest friction force at rest; `steady` [N]: friction in a steady motion, None where the law
       lacks it.
     - `stiffness` [N/m]: proportional stiffness of the loop.
-    - `jumps`: jumps of states where a kink is crossed, in terms of the values just before: kinks to states to
-      expressions.
-    - `inputs`: values given anew at every corner of the reference, in this order; `reference`: of what its pieces are
-      made.
+    - `jumps`: for each kink, the jumps of states where it is crossed, as expressions of the values just before.
+    - `inputs`: values that are new at every corner of the reference, in this order; `reference`: what its pieces
+      consist of.
     - `held`: numbers that stay constant between corners, or between the samples of a `clock` if there is one.
     """
 
@@ -102,7 +104,7 @@ class Model:
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
-        """Return the stage-file keys, and the motion's length, that the equations contain, sorted."""
+        """Return the stage-file keys that the equations contain, with the motion's length, sorted."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [*(part.scale for part in self.states), *(part.update for part in self.held), *self.settled]
         expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
@@ -115,13 +117,19 @@ class Model:
 
 
 def resets(kinks: Iterable[Kink]) -> dict[Kink, dict[sp.Symbol, sp.Expr]]:
-    """Return the jumps of states where a mode with memory changes (see `Model.jumps`)."""
+    """Return the jumps of states where a mode with memory changes, by the mode and the state.
+
+    The values are expressions of the values just before. Modes are among the `kinks`, where derivatives jump.
+    """
     switches = (kink for kink in kinks if isinstance(kink, Switch))
     return {switch: {x: new - x for x, new in becomes.items()} for switch in switches if (becomes := switch.becomes)}
 
 
 Control = Callable[[Loop, sp.Expr, sp.Expr], Controller]
-"""Function that makes a controller from its inputs and the scales of its states: a length [m] and a rate [1/s]."""
+"""Function that makes a controller from its inputs, a length [m] and a rate [1/s].
+
+Length and rate scale the controller's states.
+"""
 
 
 External = Callable[[Body], sp.Expr]
@@ -195,7 +203,7 @@ def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
 
 @dataclass(frozen=True)
 class Bodies:
-    """The bodies: cart, stage (the same when rigid), parasitic mass and motor."""
+    """The bodies of a stage: cart, stage (the same when rigid), parasitic mass and motor."""
 
     cart: Body
     stage: Body
@@ -255,7 +263,7 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
-    """Return the friction law at the motor, if there is one."""
+    """Return the friction law at the motor in terms of the motor's velocity, if there is one."""
     form = structure.transmission
     if form is None or chain.motor is None:
         return None
@@ -310,9 +318,9 @@ def _mechanics(
     forces: Pushes,
     scales: tuple[sp.Expr, sp.Expr],
 ) -> tuple[list[State], list[Component]]:
-    """Return Newton's law for every body, and the components that supply the forces.
+    """Return the states of every body by Newton's law, and the parts that supply the forces.
 
-    `frictions` act on the cart and at the motor.
+    `frictions` act on the cart and at the motor. `scales` are the length [m] and the rate [1/s] of the states.
     """
     cart, stage, parasitic, motor = chain.cart, chain.stage, chain.parasitic, chain.motor
     friction, motor_friction = frictions

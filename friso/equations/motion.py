@@ -13,12 +13,12 @@ from friso.stage.motion import DURATION, ReferenceForm, Stand, Tone, motion_of
 
 
 def form_of(flat: Mapping[str, Any]) -> ReferenceForm:
-    """Return the form of a stage's reference: degree of its polynomials and number of sinusoids."""
+    """Return what a stage's reference consists of: polynomials of a degree, and sinusoids."""
     return motion_of(flat).form(flat)
 
 
 def varies(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the runs of some stages have different motions."""
+    """Tell whether the motions of the stages in `flat`, keys with SI values, differ."""
     return any(np.ndim(value) for key, value in flat.items() if key.startswith("motion."))
 
 
@@ -37,7 +37,10 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 
 def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
-    """Return pieces with sinusoids added, cut also where the reference reverses."""
+    """Return pieces of the reference with sinusoids added, cut also where it reverses.
+
+    `rows` has the shape (runs, pieces, 1 + inputs), and `duration` [s] is that of the runs.
+    """
     ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
     for number, tone in enumerate(tones):
         for i, part in enumerate(tone):
@@ -48,9 +51,9 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
 
 
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
-    """Return the pieces of one run with sinusoids, cut where the reference reverses.
+    """Return the pieces of one run's reference with sinusoids, cut also where it reverses.
 
-    The phases of the sinusoids are given at time 0.
+    `rows` are pieces up to the time `end` [s], whose sinusoids have their phases at time 0.
     """
     starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
@@ -108,7 +111,10 @@ def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
 
 
 def rests(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference stands still in the end, so that a stage can hunt."""
+    """Tell whether the reference stands still in the end, so that a stage can hunt.
+
+    `flat` has the keys of stages; all of them must.
+    """
     return motion_of(flat).rests or _ends_without(1, flat)
 
 
@@ -118,16 +124,16 @@ def ends_evenly(flat: Mapping[str, Any]) -> bool:
 
 
 def _ends_without(derivative: int, flat: Mapping[str, Any]) -> bool:
-    """Tell whether this derivative of the reference and all higher ones end at zero.
+    """Tell whether this derivative of the reference and all higher ones are zero at the end.
 
-    It holds for all stages.
+    The result is true if that holds for all stages.
     """
     rows = pieces(flat, int(np.max([np.size(value) for value in flat.values()])))
     return bool(np.all(at_rest(form_of(flat), rows[:, -1], derivative)))
 
 
 def returns(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference of any stage stops where it began."""
+    """Tell whether the references of all stages stop where they began."""
     return motion_of(flat).rests and not np.any(motion_of(flat).pieces(flat)[-1][1])
 
 
@@ -140,20 +146,20 @@ def last_part(share: float, ended: np.ndarray, corner: np.ndarray | float) -> np
     """Return the time [s], shape (runs,), at which the last part of each run begins.
 
     Runs end at `ended` [s], shape (runs,). The last part begins after the fraction `share` of a run, such as 0.75. If
-    the last `corner` [s] of the reference is late, it begins after the fraction share - 0.25 of the time since the
-    corner, so that a stage has at least a quarter of that time to settle where the share is 0.5 or more.
+    the last `corner` [s] of the reference is late, it begins after the fraction share - 0.25 of the time since then. A
+    stage then has at least a quarter of that time to settle where the share is 0.5 or more.
     """
     late = np.where(corner < ended, corner, 0.0)
     return np.maximum(share * ended, late + (share - 0.25) * (ended - late))
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys without the keys of the motion."""
+    """Return a stage's keys without those of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of a stage whose reference stands still from the start.
+    """Return the keys of a stage whose reference stands still from the start.
 
     It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
     to its end.

@@ -52,8 +52,9 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
     """Return a Gaussian field at places [m], shape (n,), with mean 0 and variance 1.
 
     Its correlation is exp(-(d / length)^2 / 2). It is white noise in cells counted from place 0, smoothed by exp(-(d /
-    length)^2). A random Fourier series would need many more terms than the 21 cells here until it is Gaussian, and its
-    few longest waves would repeat along a rail. Raises InputError.
+    length)^2). A random Fourier series would need many more terms than the 21 cells here until it is Gaussian. Its few
+    longest waves would also repeat along a rail. Raises InputError for a length that is tiny against the range of
+    places.
     """
     at = places * (CELLS / length)
     cell = np.rint(at)
@@ -70,9 +71,10 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
 
 
 def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
-    """Return independent standard normal numbers of cells, from number `first`.
+    """Return standard normal numbers for `count` cells of the rail, from number `first` on.
 
-    Each is a function of the cell's number alone.
+    The numbers are independent, and each is a function of the cell's number and the seed alone. Raises InputError for
+    too many cells.
     """
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS

@@ -1,9 +1,9 @@
-"""Evaluate the reference within a piece: a polynomial and tones.
+"""Evaluate the reference within a piece: a polynomial and sinusoids ("tones").
 
 They are symbols in the equations, and numbers elsewhere. A row of numbers describes a piece. It holds the start [s] and
 the derivatives of the polynomial at the start. With tones it also holds the direction in which the reference moves (1,
--1), and for each tone amplitude [m], phase [turns], frequency [Hz] and sweep [Hz/s]. Phases and frequencies of tones
-are given at the start of the piece, so that they stay small.
+-1), and the parameters of each tone: amplitude [m], phase [turns], frequency [Hz] and sweep [Hz/s]. Phases and
+frequencies are given at the start of the piece, so that they stay small.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DERIVATIVES = ("position", "velocity", "acceleration", "jerk", "snap")
 """Names of the derivatives of the polynomial, from order 0."""
 
 TONE = ("amplitude", "turns", "frequency", "sweep")
-"""Names of the parameters of a tone."""
+"""Names of the parameters of a sinusoid."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Reference:
 
 
 def declared(form: ReferenceForm = QUADRATIC) -> Reference:
-    """Return the reference of a form in symbols."""
+    """Return a reference in symbols, of polynomials and sinusoids as `form` says."""
     import sympy as sp
 
     from friso.equations.blocks import sign_of_motion
@@ -72,7 +72,8 @@ def declared(form: ReferenceForm = QUADRATIC) -> Reference:
 def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -> np.ndarray:
     """Return the reference, or its first or second derivative, at a time [s] within each piece.
 
-    `elapsed` counts from the start of the piece; the result has the shape of the pieces.
+    `elapsed` counts from the start of the piece, and `order` is that of the derivative. The result has the shape of the
+    pieces, `rows` without their last axis.
     """
     total = rows[..., 1 + order] + 0.0 * elapsed
     for power in range(1, form.degree - order + 1):
@@ -86,9 +87,9 @@ def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -
 
 
 def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
-    """Return the pieces of the reference restarted a time [s] later, with the same course.
+    """Return pieces of the reference that start a time [s] later and take the same course.
 
-    Polynomials are expanded about the new start, and sines get the phase and frequency that they have there.
+    Polynomials are expanded about the new start, and sinusoids get the phase and frequency that they have there.
     """
     later = rows.copy()
     later[..., 0] += elapsed
@@ -103,9 +104,9 @@ def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
 
 
 def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.ndarray:
-    """Tell which pieces stand still, in the shape of the rows.
+    """Return which pieces stand still, in the shape of `rows` without its last axis.
 
-    With `derivative` 2, tell which pieces have a constant velocity.
+    With `derivative` 2, return which pieces have a constant velocity.
     """
     rests = np.all(rows[..., 1 + derivative : form.degree + 2] == 0, axis=-1)
     for amplitude, *_ in _tones(form, rows):
@@ -114,7 +115,7 @@ def at_rest(form: ReferenceForm, rows: np.ndarray, derivative: int = 1) -> np.nd
 
 
 def _tones(form: ReferenceForm, rows: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-    """Yield the numbers of each tone, as views of the rows."""
+    """Yield the parameters of each sinusoid, as views of the pieces `rows`."""
     first = form.degree + 3
     for number in range(form.tones):
         yield tuple(rows[..., first + len(TONE) * number + i] for i in range(len(TONE)))

@@ -37,15 +37,15 @@ SAMPLE_TIME = key("drive.sample_time")
 
 
 def counter(loop: str) -> sp.Symbol:
-    """Return the number of samples since the "position" or the "velocity" loop last ran."""
+    """Return the held number that counts samples since the "position" or "velocity" loop ran."""
     return state(f"samples_of_{loop}")
 
 
 @dataclass(frozen=True)
 class Rest:
-    """Conditions under which integrators pause or restart, apart from the force limit.
+    """Conditions under which integrators pause (`rests`) or restart at a sample.
 
-    They hold for a sample.
+    The force limit is not among them.
     """
 
     rests: Any = sp.false
@@ -55,11 +55,12 @@ class Rest:
 def sampled_controller(
     form: ControllerForm, loop: Loop, velocity_samples: int, extra: sp.Expr = sp.S.Zero, rest: Rest = Rest()
 ) -> tuple[sp.Expr, tuple[Held, ...]]:
-    """Return the force [N] that a drive commands at a sample, and what it keeps for the next.
+    """Return the force [N] that a drive commands at a sample, and the numbers that it keeps.
 
-    An `extra` force is added before the limit. `loop` holds what is known at the sample. A derivative without a filter
-    is a difference over `velocity_samples`. At the force limit an integrator follows its anti-windup; with clamping, it
-    pauses at samples where it would drive the force further beyond the limit.
+    An `extra` force is added before the limit. `loop` holds what is measured at the sample. A derivative without a
+    filter is a difference over `velocity_samples`. At the force limit an integrator follows its anti-windup; with
+    clamping, it pauses at samples where it would drive the force further beyond the limit. `rest` has further
+    conditions for integrators.
     """
     blocks = Sampled(velocity_samples, form)
     demand = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks)
@@ -74,8 +75,8 @@ def sampled_controller(
 class _Integral:
     """An integrator of a drive: its number, its next value, and its increment per sample.
 
-    It has a gain, a limit of its output, a leak, and the period of its loop. `due` is the condition for the loop to run
-    (None: at every sample).
+    The increment is `share`. There is a gain, a limit of the output, a leak, and the period of its loop. `due` is the
+    condition for the loop to run (None: at every sample).
     """
 
     symbol: sp.Symbol
@@ -128,7 +129,7 @@ class DiscreteRate:
 
 
 class Sampled(Blocks):
-    """Blocks whose memories are numbers held from one sample to the next."""
+    """Blocks of a controller as a sampled drive has them: memories are held between samples."""
 
     def __init__(self, velocity_samples: int, form: ControllerForm | None = None) -> None:
         super().__init__(form)
@@ -141,7 +142,7 @@ class Sampled(Blocks):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Mark blocks as parts of a loop; their numbers change only at samples where the loop runs."""
+        """Mark blocks as parts of a loop; their numbers change only at samples at which it runs."""
         if self.form is None or name not in self.form.loops:
             yield
             return
@@ -166,7 +167,10 @@ class Sampled(Blocks):
         return replace(signal, value=Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
-        """Return the value of an expression at the previous sample, as a held number."""
+        """Hold an expression for a sample; return the symbol of its value at the previous sample.
+
+        `settled` is its value in a steady motion.
+        """
         symbol = state(name)
         self.held.append(Held(symbol, value, settled))
         return symbol
@@ -249,17 +253,20 @@ class Sampled(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
-        """Return the limited signal, by its value at a sample."""
+        """Clip a signal to plus or minus `limit` at every sample."""
         return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
     def dead_zone(self, error: Signal) -> Signal:
-        """Return the error less the deadband, by its value at a sample."""
+        """Reduce an error by the deadband at every sample; it is 0 within the deadband."""
         band = self.key("error_deadband")
         value, settled = (part - clipped(part, band) for part in (error.value, error.settled))
         return replace(error, value=value, settled=settled, rate=None, before=None)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the standstill gains, by the error at a sample."""
+        """Return the force with the gains for standstill, at samples with a small error.
+
+        `total` is the force with the usual gains.
+        """
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))
         self.gains = Piecewise((factor, sp.Abs(error.value) < window), (1, True))
         settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
@@ -274,7 +281,10 @@ class Sampled(Blocks):
         return replace(total, value=value, settled=resting, rate=None, before=None)
 
     def push(self, error: Signal, direction: Signal) -> Signal:
-        """Return the pushing force, by error and reference at a sample."""
+        """Return the force that pushes towards the reference, by the error at a sample.
+
+        It acts while the reference rests.
+        """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
             Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
@@ -282,7 +292,7 @@ class Sampled(Blocks):
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
     def dither(self) -> Signal:
-        """Return the dither force, by the number of turns at a sample."""
+        """Return the dither force at a sample; the number of turns is held and counted on."""
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         turn = state("dither_turn")
         following = turn + frequency * SAMPLE_TIME
@@ -290,7 +300,7 @@ class Sampled(Blocks):
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _standstill(self, error: sp.Expr) -> Rest:
-        """Return when the settings against friction pause and restart integrals."""
+        """Return the conditions by which settings against friction pause or restart integrals."""
         rests: Any = sp.false
         restarts: Any = sp.false
         if self.settings.deadband:
@@ -309,7 +319,7 @@ class Sampled(Blocks):
         return Rest(rests, restarts)
 
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """Return the force before its limit and all held numbers, with integrators at limits.
+        """Return the force before its limit, and all held numbers.
 
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.

@@ -29,12 +29,15 @@ def least_static_factor(flat: Mapping[str, Any]) -> float:
 
 
 def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their static friction, Coulomb friction unchanged."""
+    """Return stages with static friction times a factor, Coulomb friction unchanged.
+
+    `flat` has the stages' keys in SI.
+    """
     return {**flat, **{key: flat[key] * factor for key in static_frictions(flat)}}
 
 
 def with_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Return stages with a multiple of their friction.
+    """Return stages with all their friction times a factor; `flat` has their keys in SI.
 
     Every force, stiffness and damping of a law is multiplied, so that its deflections and speeds do not change.
     """

@@ -22,9 +22,10 @@ from friso.stage.transmission import moving_mass
 FlatMachine = Mapping[str, Any]
 Sizes = Callable[[FlatMachine, float], dict[str, float]]
 Ranges = Callable[[FlatMachine, float], dict[str, tuple[float, float]]]
-"""Function of a stage's flat keys and the position tolerance [m].
+"""Function of a stage's keys in SI and the position tolerance [m].
 
-It returns values [SI], or ends of ranges, by name in the table [controller]."""
+It returns values [SI], or ends of ranges, by name in the table [controller].
+"""
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
 """Ranges of the integral limit, relative to break-away friction, and of the leak, relative to the bandwidth.
@@ -46,9 +47,9 @@ of the mass on the loop's stiffness."""
 class Setting:
     """A setting of a controller against friction.
 
-    It has its `name` in words, and its effect in words (`says`, with names of its keys in braces for their values). It
-    says whether it needs an integral. `sizes` computes values of its keys for a machine, and `tuned_in` the ranges in
-    which it is tuned (None: it is not tuned).
+    `name` names it in words, and `says` tells its effect in words, with names of its keys in braces for their values.
+    `integral` is true if it needs an integral. `sizes` computes values of its keys for a machine, and `tuned_in` the
+    ranges in which it is tuned (None: it is not tuned).
     """
 
     name: str
@@ -58,13 +59,16 @@ class Setting:
     tuned_in: Ranges | None = None
 
     def numbers(self, flat: FlatMachine, within: float) -> dict[str, float]:
-        """Return the setting's keys in a stage file, and their values [SI]."""
+        """Compute the setting's keys in a stage file and their values [SI], for a machine.
+
+        `within` [m] is the position tolerance.
+        """
         return {ControllerSection.key(name): value for name, value in self.sizes(flat, within).items()}
 
     def ranges(self, flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
-        """Return the setting's keys, and the ranges [SI] in which they are tuned.
+        """Compute the setting's keys and the ranges [SI] in which they are tuned, for a machine.
 
-        The result is empty if the setting is not tuned.
+        `within` [m] is the position tolerance. The result is empty if the setting is not tuned.
         """
         if self.tuned_in is None:
             return {}
@@ -72,7 +76,7 @@ class Setting:
 
 
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
-    """Return the stage's flat keys once for each set of gains that its loop may have.
+    """Return a stage's keys once for each set of gains that its loop may have.
 
     There is one set outside the standstill window, and one within it.
     """

@@ -33,7 +33,7 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 
 @dataclass(frozen=True)
 class ControllerForm:
-    """The structure of a controller: its kind, the class of its form, and further choices.
+    """The structure of a controller: its kind, the class that declares it, and further choices.
 
     Its equations depend on integral action, its anti-windup at the force limit (None: no limit), its filters, its
     settings against friction, and the loops with their own sample times. A drive may also choose how integrals (None:
@@ -73,8 +73,8 @@ class ControllerForm:
 class TransmissionForm:
     """Structure of a transmission.
 
-    It tells whether there is backlash, which friction law acts at the motor ("none": no friction) with its choices, and
-    on which sides position and velocity are measured.
+    `backlash` is true if there is any. `friction` is the law at the motor ("none": no friction), with its further
+    choices. `position` and `velocity` are the sides, motor or load, on which these are measured.
     """
 
     backlash: bool
@@ -86,14 +86,16 @@ class TransmissionForm:
 
 @dataclass(frozen=True)
 class Structure:
-    """The choices that decide which states, terms and kinks the equations have.
+    """The choices that decide which states, terms and kinks the equations of a stage have.
+
+    At a kink derivatives jump.
 
     - `masses` are the names of the masses given, for a rigid stage.
     - `biased` are the names of the masses on which a constant force acts.
     - `friction_variant` is any further choice of the friction law, such as a Stribeck exponent that is a whole number.
-    - `load_follows` tells whether friction grows with the acceleration of the reference.
+    - `load_follows`: friction grows with the acceleration of the reference.
     - `reference` describes the pieces of the reference.
-    - `limiter_pulls` tells whether a touched limiter may pull by its damping.
+    - `limiter_pulls`: a touched limiter may pull by its damping.
     """
 
     masses: tuple[str, ...]
@@ -139,7 +141,7 @@ class Structure:
 
 
 def structure(flat: Mapping[str, Any]) -> Structure:
-    """Return the structure of a stage given as flat mapping of keys to SI values."""
+    """Return the structure of a stage; `flat` has its keys, such as "friction.static", in SI."""
     law = flat["friction.model"]
     return Structure(
         masses=tuple(name for name in ("cart", "stage") if f"masses.{name}" in flat),
@@ -157,12 +159,15 @@ def structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def carrying_force(flat: Mapping[str, Any]) -> Any:
-    """Return the force [N] of the actuator that carries the constant forces of [bias], as of a vertical axis."""
+    """Return the actuator force [N] that carries the constant forces of [bias].
+
+    A vertical axis, for example, has such forces.
+    """
     return 0.0 - sum(np.asarray(flat.get(f"bias.{name}", 0.0)) for name in ("cart", "stage"))
 
 
 def shared_structure(flat: Mapping[str, Any]) -> Structure:
-    """Return the common structure of stages, read from the first of them."""
+    """Return the common structure of stages, read from the first of them; `flat` has their keys."""
     return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
@@ -186,7 +191,7 @@ def _joint_form(flat: Mapping[str, Any]) -> JointForm:
 
 
 def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
-    """Return the structure of a stage's transmission from its flat keys."""
+    """Return the structure of a stage's transmission; `flat` has the stage's keys in SI."""
     at_motor = {"friction.model": "none", **as_friction(flat)}
     law = at_motor["friction.model"]
     return TransmissionForm(
@@ -199,7 +204,7 @@ def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
 
 
 def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
-    """Return the form of the controller of a stage given as flat mapping."""
+    """Return the structure of a stage's controller; `flat` has the stage's keys in SI."""
     controller = controller_of(flat)
     return ControllerForm(
         kind=flat[KIND],

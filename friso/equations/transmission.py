@@ -23,8 +23,8 @@ BACKLASH = key("transmission.backlash")
 def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Component]:
     """Return the force of the transmission on the load [N], and its kinks.
 
-    The force is 0 within the backlash. On a flank the spring acts on the deflection beyond half the backlash, in
-    parallel with the damper.
+    At a kink derivatives jump. The force is 0 within the backlash. On a flank the spring acts on the deflection beyond
+    half the backlash, in parallel with the damper.
     """
     deflection, rate = motor.position - load.position, motor.velocity - load.velocity
     stiffness = key("transmission.stiffness")
@@ -43,13 +43,13 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
 def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:
     """Return the kinks at which the transmission touches its flanks, ahead and behind.
 
-    `deflection` [m] is the position of the motor relative to the load.
+    At a kink derivatives jump. `deflection` [m] is the position of the motor relative to the load.
     """
     return stops(deflection, BACKLASH / 2, "flank")
 
 
 def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:
-    """Return a friction law moved to the motor, with separate names and keys.
+    """Return a friction law moved from the guide to the motor, with names and keys of its own.
 
     `velocity` is that of the body for which the law was declared.
     """

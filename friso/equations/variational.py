@@ -1,8 +1,8 @@
 """Derive the variational equations: how a small deviation from a motion evolves.
 
-Between kinks the deviation obeys the linearised equations. At a kink the right-hand side or the state itself may jump.
-The deviation then jumps too, because the neighbouring motion crosses a little earlier or later. The jump is the
-saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
+Between kinks the deviation obeys the linearised equations. At a kink the right-hand side, its derivative or the state
+itself may jump. The deviation then jumps too, because the neighbouring motion crosses a little earlier or later. The
+jump is the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ def along(name: str) -> str:
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
     """Return the model extended by a small deviation of each state; the states come first.
 
-    The deviations do not influence the step size. With `keys`, they are sensitivities. In the neighbouring motion each
-    key differs by its parameter `along`, times the unit of the deviation.
+    The deviations do not influence the step size. With `keys`, they are sensitivities: they lead to a neighbouring
+    motion in which each of these keys differs by its parameter `along`.
     """
     beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     small = beside | {key(name): key(along(name)) for name in keys}
@@ -56,15 +56,19 @@ Small = Mapping[sp.Symbol, sp.Symbol]
 
 
 def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
-    """Return the directional derivative of an expression along the deviation."""
+    """Return how much an expression changes with a small deviation.
+
+    `small` maps each symbol to the symbol of its deviation.
+    """
     terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
     return sum(terms, start=sp.S.Zero)
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink.
+    """Return the jump of deviations at a kink, where derivatives jump, by deviation.
 
-    It is (f+ - f-) times the component of the deviation across the kink, divided by the speed of crossing.
+    It is (f+ - f-) times the component of the deviation across the kink, divided by the speed of crossing. f- and f+
+    are the right-hand sides just before and just after the crossing.
     """
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
@@ -80,9 +84,11 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink where states become R(x).
+    """Return the jump of deviations, by deviation, where states x become R(x).
 
-    It is DR small + (f+ - DR f-) share, with f+ taken at R(x).
+    That happens at a kink, where derivatives jump as well. The jump is DR small + (f+ - DR f-) share - small. f- and f+
+    are the right-hand sides just before and just after the crossing, f+ at R(x). `share` is the time by which the
+    neighbouring motion crosses earlier or later.
     """
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
@@ -99,10 +105,10 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Tell whether a difference is zero everywhere on the surface of a kink.
+    """Tell whether a difference is zero everywhere on a kink's surface, where derivatives jump.
 
-    It is tested at some points. It counts as not zero if the surface is linear in no symbol, like a surface that bounds
-    a window, or level at one of the points.
+    It is tested at some points. It counts as not zero if the surface is linear in no symbol, as at the end of a window.
+    So it does if the surface is level at one of the points.
     """
     if gap == 0:
         return True

@@ -98,7 +98,7 @@ def _closed(flat: Mapping[str, Any], member: Members) -> System:
 
 
 def _at_axis(system: System) -> System:
-    """Return the system without the velocity channel, which only the controller uses."""
+    """Return the system without its outputs of velocity, which only the controller uses."""
     return system.take(system.inputs, [name for name in system.outputs if name not in (VELOCITY, RATED)])
 
 

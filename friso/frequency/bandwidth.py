@@ -29,7 +29,7 @@ def loop_bandwidth(stage: Stage) -> float:
 
 
 def rigid_bandwidth(stage: Stage) -> float:
-    """Return the bandwidth of a stage with its joint locked and without a parasitic mode.
+    """Return the bandwidth [Hz] of a stage with its joint locked and without a parasitic mode.
 
     The mass then moves as a whole, as van Dijk's rules for the crossover assume.
     """
@@ -43,16 +43,20 @@ def _last_crossing(flat: Mapping[str, Any]) -> float:
 
 
 def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return the bandwidths [Hz] of a stage whose controller is faster by factors."""
+    """Return the bandwidths [Hz] of a stage whose controller is made faster by some factors.
+
+    The shape is (factors,).
+    """
     return loop_bandwidths(stage, sped_up(stage.flat(), np.array(factors)), len(factors))
 
 
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return the bandwidths [Hz] of a stage with changes, arrays (count,), in continuous time.
+    """Return the bandwidths [Hz] of a stage with changed keys, in continuous time, (count,).
 
-    They are accurate to a relative error of 1e-3: the loop is computed on a grid of frequencies, and its gain is a
-    power of frequency in between. If the gains at standstill differ, the larger bandwidth counts.
+    `changes` has the keys with their values [SI], arrays (count,). The results have a relative error of 1e-3: the loop
+    is computed on a grid of frequencies, and its gain is a power of frequency in between. If the gains at standstill
+    differ, the larger bandwidth counts.
     """
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
@@ -61,9 +65,10 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
 
 
 def _last_falls(flat: Mapping[str, Any], machines: Members, omega: np.ndarray) -> np.ndarray:
-    """Return the last frequencies [Hz] at which open loops fall through gain 1, (members,).
+    """Return the last frequencies [Hz] at which open loops fall through gain 1, (machines,).
 
-    They are searched on a grid of angular frequencies [rad/s]. NaN marks a loop that never does.
+    `machines` are states of the stage. The frequencies are searched between angular frequencies `omega` [rad/s]. NaN
+    marks a loop that never falls through 1.
     """
     loops = poles(flat, machines, DriveTiming(0.0, 0.0)).loop(omega)
     gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))

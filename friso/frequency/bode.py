@@ -32,9 +32,9 @@ PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 @dataclass(frozen=True)
 class BodeCase:
-    """A limit case: its state, plant, loop and margins.
+    """A limit case: its state, its plant, its loop L and the margins.
 
-    The plant is stage position over force [m/N]. It and the loop L are complex, over `Bode.omega`, shape (k,).
+    The plant is stage position over force [m/N]. Plant and loop are complex, over `Bode.omega`, shape (k,).
     """
 
     members: Members
@@ -47,7 +47,8 @@ class BodeCase:
 class Unstable:
     """Range of speeds [m/s], from `low` to `high`, at which a sliding stage is not stable.
 
-    `falling` tells whether its friction is smaller at the upper end.
+    `falling` is true if its friction is smaller at the upper end. `touched` is true for a touched limiter, and
+    `forward` for motion ahead.
     """
 
     low: float
@@ -75,7 +76,8 @@ class Bode:
 
     `omega` (k,) [rad/s] are the frequencies of all curves; `cases` are the limit cases by name, optionally with the
     thesis's formula for a touched limiter ("-series"); `cascades` are the loops of a cascade by limit case. All other
-    results are computed on demand.
+    results are computed when they are first used. Many of them are over a family: states near and between the limit
+    cases.
     """
 
     stage: Stage
@@ -85,18 +87,18 @@ class Bode:
 
     @cached_property
     def scan(self) -> Scan:
-        """Return the stability of all states of the family."""
+        """Return the stability of the stage in all states of a family, near and between limit cases."""
         flat = self.stage.flat()
         return scan_stability(flat, family(flat))
 
     @cached_property
     def prescribed(self) -> tuple[Prescribed, ...]:
-        """Return the loops at prescribed speeds of the cart, the limiter free."""
+        """Return the loops at the speeds `PRESCRIBED` of the cart, with a free limiter if possible."""
         return _prescribed(self.stage.flat(), self.omega)
 
     @property
     def stable(self) -> bool:
-        """Tell whether the controller is stable in every state of the family."""
+        """Tell whether the stage is stable in every state of the family, from stuck to sliding fast."""
         return bool(self.scan.stable.all())
 
     @cached_property
@@ -106,14 +108,17 @@ class Bode:
 
     @cached_property
     def worst(self) -> tuple[Members, Margins]:
-        """Return the worst state of the family, with its margins."""
+        """Return the state of the family in which the loop is the worst, with its margins.
+
+        It is the least stable one, or the one whose loop comes closest to -1.
+        """
         return self._with_margins(self.scan.worst())
 
     @cached_property
     def settled(self) -> tuple[Members, Margins]:
-        """Return the worst of the settled states, with its margins.
+        """Return the worst of the states in which a stage may settle, with its margins.
 
-        They are the limit cases, and the states stuck under any bias.
+        They are the limit cases, and the states stuck under any bias force.
         """
         return self._with_margins(self.scan.worst(self.scan.members.settled))
 
@@ -172,7 +177,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
 
 
 def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
-    """Return the stage with its joint "locked" and "free", or as it is "given" without one."""
+    """Return the stage's keys with its joint "locked" and "free", or as "given" without a joint."""
     variants = stage.variants()
     return {name: member.flat() for name, member in variants.items() if name != "given" or len(variants) == 1}
 
@@ -183,9 +188,10 @@ def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Compl
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
-    """Return the cases with a touched limiter, modelled as in Table 1 of the thesis.
+    """Return the limit cases with a touched limiter, modelled as in Table 1 of the thesis.
 
-    There the limiter is in series with the joint, so the stage has another joint and no limiter.
+    There the limiter is in series with the joint, so the stage has another joint and no limiter. Each case has a
+    stage's keys and a state.
     """
     touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
     return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
@@ -219,9 +225,9 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 
 
 def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
-    """Return the ranges of speed at which the stage is not stable.
+    """Return the ranges of speed at which the stage is not stable, within states of a family.
 
-    There is one list for each state of the limiter and direction.
+    Each belongs to one state of the limiter and one direction.
     """
     sliding = members[~members.stuck]
     ranges = []

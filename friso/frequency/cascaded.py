@@ -31,10 +31,10 @@ CascadeLoop = Literal["velocity", "position"]
 
 @dataclass(frozen=True)
 class CascadeLoops:
-    """Loops of a cascade in one state, complex, over `Bode.omega`.
+    """Loops of a cascade in one state of the stage, complex, over `Bode.omega`.
 
     `plant` leads from the commanded force to the velocity [m/(N s)], with hold, delay and current loop. `loops` are the
-    loops by name, each with its margins.
+    "velocity" and the "position" loop, with their `margins`.
     """
 
     plant: np.ndarray
@@ -43,12 +43,12 @@ class CascadeLoops:
 
 
 def is_cascade(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage's controller has a velocity loop within its position loop."""
+    """Tell whether the controller of a stage has a velocity loop within its position loop."""
     return controller_of(flat).feeds_back == "velocity"
 
 
 def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> CascadeLoops:
-    """Return the loops of a cascade in one state at angular frequencies [rad/s]."""
+    """Return the loops of a cascade in one state of the stage, over angular frequencies [rad/s]."""
     drive = DriveTiming.of(flat)
     moved = plant(flat, member).take((FORCE,), (VELOCITY,)).at(1j * omega)[0, :, 0, 0]
     alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # open the position loop
@@ -68,14 +68,20 @@ def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -
 
 
 def _seen(rates: Complex) -> np.ndarray:
-    """Return which poles [rad/s] of a velocity loop (1, n) the feedback can move, shape (n,)."""
+    """Return which poles of a velocity loop its feedback can move, shape (n,).
+
+    `rates` are the poles [rad/s], shape (1, n).
+    """
     settings = FrequencySettings.current()
     sizes = np.abs(rates[0])
     return sizes > settings.unseen_pole * sizes[np.isfinite(sizes)].max(initial=0.0)
 
 
 def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
-    """Return the position loop over angular frequencies [rad/s], with the velocity loop closed."""
+    """Return the position loop as a function of angular frequencies [rad/s].
+
+    The velocity loop within it is closed.
+    """
     if not drive.sample_time:
         outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
         return lambda omega: outer(omega) / (1 + inner(omega))

@@ -37,9 +37,9 @@ class Limits:
 
     For both kinds, one range contains the stage's own crossover, or is the next one below it (or the lowest).
     `highest_stable` and `highest_comfortable` are the upper ends of these ranges, None without a range. `first_lost` is
-    the state that becomes unstable just above `highest_stable`, and `closest` the state that comes closest to -1 just
-    above `highest_comfortable` (None at the end of the search). Without a range, both states are given at the stage's
-    own crossover. For a controller given by gains all values are factors of its bandwidth.
+    the state that becomes unstable just above `highest_stable`. `closest` is the state that comes closest to -1 just
+    above `highest_comfortable`. Each is None if its range ends with the search. Without a range, both states are given
+    at the stage's own crossover. For a controller given by gains all values are factors of its bandwidth.
     """
 
     searched: Range
@@ -57,7 +57,10 @@ class Limits:
 
 
 def limits(flat: Mapping[str, Any]) -> Limits:
-    """Return the crossovers at which a stage is stable, and comfortably so."""
+    """Find the crossovers at which a stage is stable, and those with a comfortable margin.
+
+    `flat` has the stage's keys in SI.
+    """
     settings = FrequencySettings.current()
     search = _Search(flat, settled_members(flat))
     ends, crossover = search.ends, _stated(flat)
@@ -78,7 +81,10 @@ def limits(flat: Mapping[str, Any]) -> Limits:
 
 
 def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
-    """Return the crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
+    """Return the ranges of crossovers [Hz] at which a stage is stable in all given states.
+
+    For a controller that states no crossover, they are factors of its bandwidth.
+    """
     return _Search(flat, members).stable()
 
 
@@ -92,9 +98,10 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 
 
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
-    """Return the range of crossovers that is searched.
+    """Return the range of crossovers [Hz] that is searched.
 
-    It ends below half the sampling frequency of a drive.
+    It ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a range of
+    factors of its bandwidth.
     """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
@@ -104,7 +111,10 @@ def searched_crossovers(flat: Mapping[str, Any]) -> Range:
 
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
-    """Return the least modulus margin of the settled states; 0 if one is unstable."""
+    """Return the least modulus margin of the states in which a stage may settle.
+
+    It is 0 if one of them is unstable.
+    """
     loops = scan_stability(flat, settled_members(flat))
     return float(loops.distance.min()) if loops.stable.all() else 0.0
 
@@ -120,9 +130,9 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 
 def unstable_as_built(flat: Mapping[str, Any]) -> tuple[bool, bool]:
-    """Tell whether only sampling and delay of a drive make the loop unstable.
+    """Tell whether a loop is unstable only because of the drive's sampling and delay.
 
-    The first result is for a sticking stage, the second for a sliding one.
+    The first result is for a sticking stage, the second for a sliding one. `flat` has the stage's keys in SI.
     """
     members = settled_members(flat)
     smooth = {key: value for key, value in flat.items() if not key.startswith("drive.")}
@@ -144,9 +154,9 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search over crossovers of a stage's controller, in all its settled states.
+    """A search over crossovers of a stage's controller, in all states in which it may settle.
 
-    Arrays have the shape (crossovers,). Parts that do not depend on the crossover are computed once.
+    `members` are these states. Parts that do not depend on the crossover are computed once.
     """
 
     flat: Mapping[str, Any]
@@ -158,20 +168,20 @@ class _Search:
 
     @cached_property
     def at(self) -> np.ndarray:
-        """Return the crossovers between which ends of ranges are located."""
+        """Return the crossovers [Hz] at which to look first, shape (crossovers,)."""
         settings = FrequencySettings.current()
         return np.geomspace(*self.ends, settings.crossover_steps)
 
     def stable(self) -> tuple[Range, ...]:
-        """Return the crossovers at which all members are stable."""
+        """Return the ranges of crossovers at which the stage is stable in all states."""
         return ranges_below(self.at, lambda f: self.abscissa(f).max(axis=1))
 
     def abscissa(self, crossover: np.ndarray) -> np.ndarray:
-        """Return the real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
+        """Return the real part [1/s] of the rightmost closed-loop pole, (crossovers, states)."""
         return self._by_poles(crossover).abscissa.reshape(len(crossover), -1)
 
     def distance(self, crossover: np.ndarray) -> np.ndarray:
-        """Return the least distance of the loop from -1, shape (crossovers, members)."""
+        """Return the least distance of the loop from -1, shape (crossovers, states)."""
         omega, loops_of = self._loops
         held = DriveTiming.of(self.flat).transfer(omega)
         shared = np.array([distance_to_lines(loops_of(_at(self.flat, f)) * held) for f in crossover])
@@ -181,8 +191,8 @@ class _Search:
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
         """Return frequencies [rad/s] that resolve the loop at all crossovers, and a loop function.
 
-        The frequencies do not depend on the crossover, so that the distance is a
-        smooth function. The function takes the keys of any controller.
+        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. These do
+        not depend on the crossover, so that the distance from -1 is a smooth function of it.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]
@@ -197,6 +207,6 @@ class _Search:
         return self._looked_at(self.at)
 
     def _looked_at(self, crossover: np.ndarray) -> PoleStability:
-        """Return the stability of all members at each crossover, one crossover after the other."""
+        """Return the stability of all states at each crossover, one crossover after the other."""
         keys = _at(self.flat, np.repeat(crossover, len(self.members)))
         return stability_by_poles(keys, self.members.repeated(len(crossover)))

@@ -1,4 +1,4 @@
-"""Linearise declared equations: derive the Jacobian once, and evaluate it for members."""
+"""Linearise equations: derive the Jacobian in symbols, and evaluate it for many states."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from friso.frequency.system import System
 class Declared:
     """Equations to be linearised, in symbols.
 
-    They have states with their rates, inputs, and outputs with their expressions, by name.
+    `states` have their `rates` of change. `inputs` are symbols, and `outputs` expressions, by name.
     """
 
     states: tuple[sp.Symbol, ...]
@@ -27,7 +27,7 @@ class Declared:
 
     @cached_property
     def _entries(self) -> tuple[list[tuple[int, int]], Any, list[str]]:
-        """Return the places of non-zero entries of [[a, b], [c, d]], and a function for them.
+        """Return where the matrix [[a, b], [c, d]] is not zero, and a function for these entries.
 
         Also returns the names of the function's arguments.
         """
@@ -41,7 +41,7 @@ class Declared:
     def at(self, values: Mapping[str, Any], members: int) -> System:
         """Return the linear systems for values of the symbols, by name.
 
-        Values are numbers or arrays of shape (members,).
+        Values are numbers, or arrays of shape (members,) for as many systems.
         """
         places, function, names = self._entries
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)

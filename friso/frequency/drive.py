@@ -40,7 +40,7 @@ class DriveTiming:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
-        """Return the drive of a stage.
+        """Return the timing of a stage's drive; `flat` has the stage's keys in SI.
 
         Raises InputError for a delay of too many samples, and for a loop that is due too rarely.
         """
@@ -73,7 +73,7 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return the response of hold, delay and current loop at frequencies [rad/s].
+        """Return the frequency response of hold, delay and current loop at frequencies [rad/s].
 
         Aliases are left out.
         """
@@ -94,13 +94,13 @@ class DriveTiming:
 
 
 def resonances(poles: Complex) -> Complex:
-    """Return the poles [rad/s] that are lightly damped."""
+    """Return those of the poles [rad/s] that are lightly damped."""
     settings = FrequencySettings.current()
     return poles[np.abs(poles.real) < settings.light_damping * np.abs(poles.imag)]
 
 
 def behind_current_loop(machine: System, lag: float) -> System:
-    """Return a plant with one input whose force follows with a first-order lag [s], 0 for none."""
+    """Return a plant with one input whose force follows by a first-order `lag` [s]; 0 for none."""
     if not lag:
         return machine
     pole = np.full((1, 1), 1 / lag)
@@ -108,10 +108,9 @@ def behind_current_loop(machine: System, lag: float) -> System:
 
 
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
-    """Return a plant with one input in discrete time, behind a hold and a delay.
+    """Return a plant with one input in discrete time, behind a hold and a delay, exactly.
 
-    The delay `late` [s] is less than a sample. The result is exact; the force that is still acting becomes a further
-    state.
+    The delay `late` [s] is less than a sample. The force that is still acting becomes a further state.
     """
     members, n, waiting = len(machine.a), len(machine.states), int(late > 0)
     rest, before = _transition(machine, late)
@@ -167,7 +166,10 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """Return a plant with one input behind another system, given by four matrices."""
+    """Return a plant with one input behind another system, given by its matrices a, b, c, d.
+
+    `name` names that system's states.
+    """
     la, lb, lc, ld = first
     members, n, k = len(machine.a), len(machine.states), len(la)
     a = np.zeros((members, n + k, n + k))
@@ -188,7 +190,7 @@ def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def exponentials(matrices: np.ndarray) -> np.ndarray:
-    """Return matrix exponentials, shape (members, n, n), of all members at once.
+    """Return the exponentials of square matrices, shape (members, n, n), all at once.
 
     The method is Pade's of order 6 with scaling and squaring (Higham 2005, doi:10.1137/04061101X); `scipy.linalg.expm`
     takes them one by one.

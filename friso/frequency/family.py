@@ -1,9 +1,9 @@
-"""Analyse a family of states of a stage at once.
+"""Analyse a family of states of a stage: stuck under any bias force, sliding at any speed.
 
 Friction is an impedance between cart and ground, and the masses are computed once. The masses without friction respond
 to forces on stage and cart by g (2 x 2), and by h with the cart held. With the dynamic stiffness k = s Z of friction on
-the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large numbers are subtracted, and each member and
-frequency takes a few operations.
+the cart, the stage responds by (g_ss + k g_cc h)/(1 + k g_cc). No large numbers are subtracted, and each member (state)
+and frequency takes a few operations.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _T = TypeVar("_T")
 
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Frequencies around a member's closed-loop resonances at which it is evaluated, in half widths."""
+"""Frequencies about a closed-loop resonance at which it is evaluated, in half widths."""
 
 
 @dataclass(frozen=True)
 class Scan:
-    """Stability of the `members` of a stage with keys `flat`, arrays of shape (members,).
+    """Stability of a stage in many states, its members, as arrays of shape (members,).
 
-    Modulus margins are computed on first use.
+    `flat` has the stage's keys in SI. Modulus margins are computed on first use.
     """
 
     flat: Mapping[str, Any]
@@ -48,19 +48,19 @@ class Scan:
 
     @property
     def abscissa(self) -> np.ndarray:
-        """Return the real part [1/s] of the rightmost closed-loop pole."""
+        """Return the real part [1/s] of the rightmost closed-loop pole in each state, (members,)."""
         return self.by_poles.abscissa
 
     @property
     def stable(self) -> np.ndarray:
-        """Return which members are stable."""
+        """Return in which states the stage is stable, shape (members,)."""
         return self.abscissa < 0
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """Return the least distance of each member's loop from -1.
+        """Return the least distance of the loop from -1 in each state, shape (members,).
 
-        It is computed at common frequencies and near each member's closed-loop resonances. For the members that come
+        It is computed at common frequencies and near each state's closed-loop resonances. For the states that come
         closest to -1 it is exact.
         """
         settings = FrequencySettings.current()
@@ -89,15 +89,15 @@ class Scan:
 
 
 def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
-    """Return the stability of every member, and its modulus margin."""
+    """Return the stability of a stage in every state of `members`, with modulus margins."""
     return Scan(flat, members, stability_by_poles(flat, members))
 
 
 class PoleStability(NamedTuple):
-    """Stability of members by their closed-loop poles, both of shape (members,).
+    """Stability of a stage in many states by its closed-loop poles, both of shape (members,).
 
-    `abscissa` is the real part of the rightmost pole [1/s], 0 on the edge of stability; `resonant` is the least abs(1
-    + L) about closed-loop resonances.
+    `abscissa` is the real part of the rightmost pole [1/s], 0 on the edge of stability; `resonant` is the least abs(1 +
+    L) about closed-loop resonances.
     """
 
     abscissa: np.ndarray
@@ -105,9 +105,9 @@ class PoleStability(NamedTuple):
 
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
-    """Return the stability of every member by its poles.
+    """Return the stability of a stage in every state of `members`, by its closed-loop poles.
 
-    `flat` may hold arrays of shape (members,), except in the drive's keys.
+    `flat` has its keys in SI, which may be arrays of shape (members,), except the drive's.
     """
     by_poles = PoleStability(np.empty(len(members)), np.empty(len(members)))
 
@@ -123,10 +123,10 @@ def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStabili
 def for_poles(
     flat: Mapping[str, Any], members: Members, function: Callable[[Poles], _T]
 ) -> list[tuple[np.ndarray, _T]]:
-    """Apply a function to the poles of all members, a few at a time, side by side.
+    """Apply a function to the poles of a stage in many states, a few states at a time.
 
-    Yields the numbers of the members and the results. `flat` may hold arrays of shape (members,), except in the drive's
-    keys.
+    Returns pairs of the states' numbers and the function's result. `flat` has the keys in SI, which may be arrays of
+    shape (members,), except the drive's.
     """
     drive = DriveTiming.of(flat)
 
@@ -147,9 +147,9 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 
 
 def about_resonances(system: Poles) -> np.ndarray:
-    """Return angular frequencies [rad/s] about each member's lightly damped closed-loop poles.
+    """Return angular frequencies [rad/s] about each state's lightly damped closed-loop poles.
 
-    The shape is (members, k), with NaN for members that have fewer.
+    The shape is (members, k), with NaN for states that have fewer.
     """
     settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not show which alias resonates
@@ -161,9 +161,9 @@ def about_resonances(system: Poles) -> np.ndarray:
 
 
 def distance_to_lines(loop: Complex) -> np.ndarray:
-    """Return the least distance from -1 of loops over ascending frequencies, shape (...).
+    """Return the least distance of loops from -1, shape (...).
 
-    Loops have the shape (..., k) and are joined by straight lines.
+    Loops are given over ascending frequencies, shape (..., k), and joined by straight lines.
     """
     start, step = 1 + loop[..., :-1], np.diff(loop, axis=-1)
     length = np.maximum(np.abs(step) ** 2, np.finfo(float).tiny)
@@ -183,14 +183,14 @@ def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 
 
 def closed_loop_poles(flat: Mapping[str, Any], members: Members) -> Complex:
-    """Return the finite closed-loop poles [rad/s] of members."""
+    """Return the finite closed-loop poles [rad/s] of a stage in all states of `members`, (n,)."""
     drive = DriveTiming.of(flat)
     roots = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
     return roots[np.isfinite(roots)]
 
 
 def plant_poles(flat: Mapping[str, Any], members: Members) -> Complex:
-    """Return the poles [rad/s] of the plant in all states of `members`."""
+    """Return the poles [rad/s] of the plant in all states of `members`, shape (n,)."""
     return np.concatenate([np.linalg.eigvals(plant(flat, kind).a).ravel() for kind in members.kinds]).astype(complex)
 
 
@@ -223,7 +223,7 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """Return the loops L at angular frequencies [rad/s], shape (members, k).
+    """Return the loops L in each state at angular frequencies [rad/s], shape (members, k).
 
     A sampled loop is taken without the aliases of the plant.
     """
@@ -231,10 +231,10 @@ def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Compl
 
 
 def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
-    """Return a function from controller keys to L without hold, delay and current loop.
+    """Return a function from a stage's keys to its loops L without hold, delay, current loop.
 
-    L has the shape (members, k) over angular frequencies (k,) [rad/s]. Parts that do not depend on the controller are
-    computed once.
+    The keys may have any controller. L has the shape (members, k) over angular frequencies (k,) [rad/s]. Parts that do
+    not depend on the controller are computed once.
     """
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
@@ -247,7 +247,7 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
     """Return the measured signals over the force, shape (members, k, 2), from the whole plant.
 
     They are position [m/N] and velocity [m/(N s)]; for a sampled drive, the second is the position that it
-    differentiates [m/N]. Encoders may be on different sides of a transmission.
+    differentiates [m/N]. Encoders may be on different sides of a transmission. `members` are states of the stage.
     """
     settings = FrequencySettings.current()
     second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
@@ -261,16 +261,19 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
 
 
 def controller_response(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Return the controller's force over a deviation of the stage [N/m], sign reversed, (k,)."""
+    """Return the controller's force over a deviation of the stage [N/m], sign reversed, (k,).
+
+    `omega` (k,) are angular frequencies [rad/s].
+    """
     position, second = _channels(flat, omega).T
     return position + (second if DriveTiming.of(flat).sample_time else 1j * omega * second)
 
 
 def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Return the controller's force over each measured channel, sign reversed, shape (k, 2).
+    """Return the controller's force over each measured signal, sign reversed, shape (k, 2).
 
-    Channels are position [N/m] and velocity [N s/m], or two positions for a sampled drive. With loops at several rates,
-    the part at the frequency of the input counts.
+    The signals are position [N/m] and velocity [N s/m], or two positions for a sampled drive. With loops at several
+    rates, the part at the frequency of the input counts.
     """
     drive = DriveTiming.of(flat)
     if drive.sample_time:
@@ -285,7 +288,7 @@ def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
 def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Complex:
     """Return the friction force over the cart's velocity [N s/m], shape (members, k).
 
-    The complex frequencies s have the shape (k,).
+    `members` are states of the stage, and `s` complex frequencies [rad/s], shape (k,).
     """
     law = law_of(flat)
     if law is None:

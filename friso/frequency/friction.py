@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 
 VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
 FORWARD = str(direction(VELOCITY).beyond)
-"""Name of the symbol for the direction of the motion."""
+"""Name of the symbol that is 1 for motion ahead, and 0 for motion back."""
 
 
 @dataclass(frozen=True)
 class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force.
 
-    It also has the law's steady states, sliding at a velocity and bearing a bias force at rest: internal states, then
-    modes that remember and sides of kinks. `lengths` [m] are among the scales of its states.
+    `sliding` and `stuck` are functions for the law's steady states, sliding at a velocity and bearing a bias force at
+    rest: internal states, then modes with memory and sides of kinks, where derivatives jump. `lengths` [m] gives those
+    scales of its states that are lengths.
     """
 
     declared: Declared
@@ -49,15 +50,15 @@ class LinearFriction:
 
 
 def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of a stage; None without friction."""
+    """Return the friction law of a stage, linearised; None without friction."""
     form = shared_structure(flat)
     return _law(form.friction, form.friction_variant)
 
 
 def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
-    """Return the law of the motor's friction, with the motor's states; None without friction.
+    """Return the law of friction at the motor, linearised and with the motor's names of states.
 
-    The states are given by their names.
+    The result is None without such friction.
     """
     form = shared_structure(flat).transmission
     law = _law(form.friction, form.friction_variant) if form else None
@@ -92,7 +93,7 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 
 
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the internal states of the friction law that bear the bias force at rest.
+    """Return the friction law's internal states that bear the bias force at rest, by symbol.
 
     All states are deflected equally from their unloaded value.
     """
@@ -108,7 +109,7 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """Return a function that evaluates expressions from values of their symbols, by name.
+    """Compile expressions into a function of a mapping: their symbols' names to values.
 
     Overflow gives infinity or NaN.
     """
@@ -123,7 +124,10 @@ def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[
 
 
 def level(flat: Mapping[str, Any], forward: bool) -> float:
-    """Return the friction force [N] at which a stuck cart breaks away; 0 for a law that creeps."""
+    """Return the friction force [N] at which a stuck cart breaks away; 0 for a law that creeps.
+
+    `forward` is the direction, and `flat` has the stage's keys in SI.
+    """
     law = law_of(leading_friction(flat))
     return float(steady_force(flat, np.zeros(1), forward)[0]) if law is not None and law.states else 0.0
 
@@ -131,7 +135,7 @@ def level(flat: Mapping[str, Any], forward: bool) -> float:
 def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> np.ndarray:
     """Return the friction force [N] against steady motion at speeds [m/s], both (count,).
 
-    `forward` gives the direction.
+    `forward` is true for motion ahead. `flat` has the stage's keys in SI.
     """
     flat = leading_friction(flat)
     law, sign = law_of(flat), 1.0 if forward else -1.0

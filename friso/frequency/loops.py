@@ -27,20 +27,20 @@ from friso.frequency.settings import FrequencySettings
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
-"""Rounding error of a slow pole over the fastest pole."""
+"""Rounding error of a slow pole, relative to the fastest pole."""
 
 
 def open_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """Return the loop cut at the actuator force, in continuous time.
+    """Return the loop cut at the actuator force, in continuous time, in each state of `members`.
 
-    It leads from the force on the stage to the controller's force with reversed sign, so that 1 + L = 0 at the poles of
-    the closed loop.
+    It leads from the force on the stage to the controller's force with reversed sign. So 1 + L = 0 at the poles of the
+    closed loop.
     """
     return _cut(plant(flat, members), compensator(flat, len(members)))
 
 
 def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """Return the closed loop in continuous time, with all its inputs and outputs.
+    """Return the closed loop in continuous time, in each state of `members`.
 
     Inputs are a force on the stage, the reference, a disturbance on the cart, noise of the sensor, and feedforward of
     the reference. Outputs are the outputs of the plant, and the actuator force.
@@ -76,10 +76,10 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
 
 @dataclass(frozen=True)
 class Poles:
-    """Poles of the `closed` loop, and of the loop `cut` open, both of shape (members, n).
+    """Poles of the `closed` loop, and of the loop `cut` open, in many states of a stage.
 
-    They include the drive, and are in the plane of s [rad/s], or of z for a sampled drive. `continuous` are the poles
-    of the closed loop in continuous time without delay.
+    Both have the shape (members, n), one row per state. They include the drive, and are in the plane of s [rad/s], or
+    of z for a sampled drive. `continuous` are the poles of the closed loop in continuous time without delay.
     """
 
     closed: Complex
@@ -94,10 +94,10 @@ class Poles:
 
     @property
     def abscissa(self) -> np.ndarray:
-        """Return the real part [1/s] of the rightmost closed-loop pole, shape (members,).
+        """Return the real part [1/s] of the rightmost closed-loop pole in each state, (members,).
 
-        It is 0 for a pole on the imaginary axis, up to rounding. Slow poles are taken in continuous time without
-        delay, where rounding does less harm.
+        It is 0 for a pole on the imaginary axis, up to rounding. Slow poles are taken in continuous time without delay,
+        where rounding does less harm.
         """
         settings = FrequencySettings.current()
         step = self.drive.sample_time or self.drive.delay
@@ -109,7 +109,7 @@ class Poles:
         return np.maximum(fast.max(axis=1), slow.max(axis=1))
 
     def distance(self, omega: np.ndarray) -> np.ndarray:
-        """Return abs(1 + L) at angular frequencies [rad/s], shape (members, k).
+        """Return abs(1 + L) of the loop L at angular frequencies [rad/s], shape (members, k).
 
         It is the product of the distances to all closed-loop poles, over that to all poles of the cut loop.
         """
@@ -120,7 +120,7 @@ class Poles:
         return np.sqrt(squared)
 
     def loop(self, omega: np.ndarray) -> Complex:
-        """Return L at angular frequencies (k,) [rad/s], shape (members, k).
+        """Return the loop L at angular frequencies (k,) [rad/s], shape (members, k).
 
         Its error is relative to its size and to 1.
         """
@@ -137,11 +137,11 @@ class Poles:
 
 
 def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: str = "") -> Poles:
-    """Return the poles of the loop in each state.
+    """Return the poles of the loop in each state of `members`.
 
-    All members are stuck, or none is. A delay in continuous time is replaced by a rational function. `cut` names the
-    measured channel, STAGE or VELOCITY, whose feedback is left open. Raises InputError for a delay that is too long
-    for that function.
+    The stage is stuck in all of them, or in none. A delay in continuous time is replaced by a rational function. `cut`
+    names the measured signal, STAGE or VELOCITY, whose feedback is left open. Raises InputError for a delay that is too
+    long for that function.
     """
     machine = _driven(flat, members, drive)
     bare = _cut(machine, _continuous(flat, len(members), cut))
@@ -161,10 +161,10 @@ def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: st
 def response(
     flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = ""
 ) -> Callable[[np.ndarray], Complex]:
-    """Return the exact L of a stage in one state, as a function of frequencies [rad/s].
+    """Return the loop L of a stage in one state, exactly, as a function of frequencies [rad/s].
 
-    With loops at several rates it is the characteristic locus (see `friso.frequency.rates`). One measured channel may
-    be `cut`.
+    With loops at several rates it is the characteristic locus (see `friso.frequency.rates`). The feedback of one
+    measured signal may be `cut`.
     """
     if drive.sample_time:
         lifted = lifted_loop(flat, member, drive, cut)
@@ -174,7 +174,10 @@ def response(
 
 
 def lifted_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = "") -> Lifted:
-    """Return the loop of a sampled drive over its period, cut at the actuator."""
+    """Return the loop of a sampled drive over the period of its loops, cut at the actuator.
+
+    The feedback of one measured signal may be `cut` as well.
+    """
     return cut_over_period(_held(_driven(flat, member, drive), drive), _controls(flat, len(member), drive, cut))
 
 
@@ -191,13 +194,16 @@ def _held(machine: System, drive: DriveTiming) -> System:
 
 
 def _continuous(flat: Mapping[str, Any], members: int, cut: str) -> System:
-    """Return the controller in continuous time with one channel cut."""
+    """Return the controller in continuous time, without the measured signal `cut`.
+
+    There are `members` equal ones, unless keys are arrays.
+    """
     control = compensator(flat, members)
     return unseen(control, cut) if cut else control
 
 
 def _controls(flat: Mapping[str, Any], members: int, drive: DriveTiming, cut: str) -> tuple[System, ...]:
-    """Return the controller at each sample of a period, with one channel cut."""
+    """Return the controller at each sample of a period, without the measured signal `cut`."""
     controls = samples_controller({**flat, "drive.sample_time": drive.sample_time}, members, drive.period)
     sampled = {VELOCITY: RATED}.get(cut, cut)
     return tuple(unseen(control, sampled) for control in controls) if cut else controls

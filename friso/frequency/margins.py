@@ -76,7 +76,7 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
 
 
 def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
-    """Return the margins of one loop of a stage from its response and its poles."""
+    """Return the margins of one loop of a stage from its response, `at`, and its poles."""
     settings = FrequencySettings.current()
     drive, closed = loop_poles.drive, loop_poles.in_s[0]
     resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
@@ -94,7 +94,7 @@ def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_
 def frequencies(
     flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
-    """Return angular frequencies [rad/s] that resolve the loops of all members.
+    """Return angular frequencies [rad/s] that resolve the loops in all states of `members`.
 
     There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
     the poles `resonant`.
@@ -107,14 +107,20 @@ def frequencies(
 
 
 def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
-    """Return ascending angular frequencies [rad/s], with more of them about resonances."""
+    """Return ascending angular frequencies [rad/s]: `even` ones, and more about resonances.
+
+    `resonant` are poles [rad/s], of which the lightly damped ones count.
+    """
     light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
-    """Return the loop at frequency 0, if it is finite there: real, and constant towards 0."""
+    """Return the loop at frequency 0 in a list, which is empty if it is not finite there.
+
+    It is finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
+    """
     settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
     flat = np.abs(low - lower) < settings.rest_frequency * np.abs(lower) and np.abs(
@@ -160,7 +166,7 @@ def _decades(loop: Complex) -> np.ndarray:
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return where a function of frequency, given at some frequencies, passes zero.
+    """Return the frequencies at which a function passes zero, from its values at `omega`.
 
     Jumps, such as those of a locus that changes to an alias, do not count.
     """
@@ -186,7 +192,10 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
-    """Return where L comes closest to -1 [rad/s], and how close."""
+    """Return the frequency [rad/s] at which the loop L comes closest to -1, and the distance.
+
+    `distance` has the distances at frequencies `omega` [rad/s].
+    """
     inner = np.flatnonzero((distance[1:-1] <= distance[:-2]) & (distance[1:-1] <= distance[2:])) + 1
     least = int(distance.argmin())
     best = float(omega[least]), float(distance[least])

@@ -23,8 +23,8 @@ BIASES, SPEEDS = 65, 257
 class Members:
     """States of a stage, one per row, each array of shape (members,).
 
-    `speed` [m/s] of the cart, 0 where it is stuck; `bias` [N], the friction force of a stuck cart, positive where it
-    opposes the motion; `touched`, whether the limiter is; `forward`, the direction of the motion.
+    `speed` [m/s] is that of the cart, 0 where it is stuck. `bias` [N] is the friction force of a stuck cart, positive
+    where it opposes the motion. `touched` is true if the limiter is touched, and `forward` for motion ahead.
 
     Examples
     --------
@@ -43,33 +43,33 @@ class Members:
         return len(self.speed)
 
     def __getitem__(self, which: Any) -> Members:
-        """Select members by numbers or by a boolean array."""
+        """Select states by numbers or by a boolean array."""
         return Members(*(np.atleast_1d(getattr(self, field.name)[which]) for field in fields(self)))
 
     @property
     def kinds(self) -> list[Members]:
-        """Return the stuck members and the others as two groups, because they have different states.
+        """Return the stuck states and the sliding ones as two groups; empty groups are left out.
 
-        Empty groups are left out.
+        The equations of both have different states.
         """
         return [self[mask] for mask in (self.stuck, ~self.stuck) if mask.any()]
 
     @property
     def stuck(self) -> np.ndarray:
-        """Return which members are stuck."""
+        """Return in which states the cart is stuck, shape (members,)."""
         return self.speed == 0
 
     @property
     def settled(self) -> np.ndarray:
-        """Return which members of a family are stuck, or slide the fastest."""
+        """Return which states of a family are stuck, or slide the fastest, shape (members,)."""
         return self.stuck | (self.speed == self.speed.max())
 
     def with_limiter(self, touched: bool) -> Members:
-        """Return the members with the limiter touched or not."""
+        """Return the states with the limiter touched or not."""
         return replace(self, touched=np.full(len(self), touched))
 
     def repeated(self, times: int) -> Members:
-        """Return all members, repeated `times` times one after the other."""
+        """Return all states, repeated `times` times one after the other."""
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
@@ -94,14 +94,15 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
 
 
 def concatenate_families(parts: list[Members]) -> Members:
-    """Return all members of several families, one after the other."""
+    """Return all states of several families, one after the other."""
     return Members(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Members)))
 
 
 def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
-    """Return the limit cases by name: "stuck" and "sliding" (fast).
+    """Return the limit cases of a stage by name: "stuck" and "sliding" (fast).
 
     Both have "-touched" appended where the limiter is touched (Table 1). A stage with just one case calls it "given".
+    `flat` has the stage's keys in SI.
     """
     flat = leading_friction(flat)
     moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
@@ -117,10 +118,10 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
 
 
 def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
-    """Return states near every limit case of a stage, stuck and sliding.
+    """Return states near and between all limit cases of a stage, stuck and sliding.
 
-    Stuck members bear bias forces up to nearly break-away, for and against the motion. Sliding members cover all
-    speeds, in both directions if friction differs between them.
+    Stuck ones bear `biases` different bias forces up to nearly break-away, for and against the motion. Sliding ones
+    cover all speeds by `speeds_` of them, in both directions if friction differs between them.
     """
     settings = FrequencySettings.current()
     flat = leading_friction(flat)
@@ -146,5 +147,5 @@ def _fast(flat: Mapping[str, Any]) -> float:
 
 
 def limiter_states(flat: Mapping[str, Any]) -> tuple[bool, ...]:
-    """Tell whether the limiter may be free, touched, or both."""
+    """Return whether the limiter of a stage may be free (False), touched (True), or both."""
     return {"free": (False, True), "touching": (True,)}.get(structure(flat).joint, (False,))

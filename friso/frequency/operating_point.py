@@ -14,10 +14,10 @@ from friso.stage.transmission import STATE_PREFIX, of_motor
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Return operating points of a friction law by name, each of shape (members,).
+    """Return the steady values of a stage's friction law in each state of `members`, by name.
 
-    They are the values of its internal states, of its modes that remember, of the sides of its kinks, and of its
-    direction.
+    Each has the shape (members,). They are the values of its internal states, of its modes with memory, of the sides of
+    its kinks (where derivatives jump), and of its direction.
     """
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:
@@ -33,9 +33,9 @@ def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]
 
 
 def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Return operating points of the motor's friction law.
+    """Return the steady values of the friction law at the motor in each state, by name.
 
-    The motor moves with the load and bears no bias.
+    The motor moves with the load and bears no bias force.
     """
     unbiased = replace(members, bias=np.zeros(len(members)))
     point = operating_point(of_motor(flat), unbiased)

@@ -1,4 +1,4 @@
-"""Represent plant and controller of a stage as linear systems, for many members at once."""
+"""Represent plant and controller of a stage as linear systems, for many states at once."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ _CONTROLLER_INPUTS = {
 
 
 def plant(flat: Mapping[str, Any], members: Members) -> System:
-    """Return the plant of members that are all stuck, or all not.
+    """Return the plant in each state of `members`, which are all stuck or all sliding.
 
     Inputs are the forces on stage and cart [N]. Outputs are the positions of stage and cart, the joint deflection, the
-    position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` may hold arrays of shape
-    (members,).
+    position at the velocity's encoder [m], and the velocity of the stage [m/s]. `flat` has the keys in SI, which may be
+    arrays of shape (members,).
     """
     form = _plant(shared_structure(flat).standing)
     velocity = np.where(members.forward, members.speed, -members.speed)
@@ -70,10 +70,10 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
-    """Return the masses without friction, from forces on stage and cart to their positions.
+    """Return the masses without friction as systems, from forces on stage and cart to positions.
 
-    There is one system for each entry of `touched`. Raises InputError for a transmission with another nonlinearity
-    than the friction of the guide.
+    There is one system for each entry of `touched`, with the limiter touched or not. Raises InputError for a
+    transmission with another nonlinearity than the friction of the guide.
     """
     drive = shared_structure(flat).transmission
     if drive is not None and (drive.backlash or drive.friction != "none"):
@@ -84,13 +84,19 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 
 
 def _limiter(touched: np.ndarray) -> dict[str, Any]:
-    """Return the limiter's modes by name: free, or touched ahead."""
+    """Return the symbols that say whether the limiter is touched, by name, with their values.
+
+    It is free, or touched ahead.
+    """
     ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
     return {ahead: touched.astype(float), behind: 0.0}
 
 
 def _on_flank() -> dict[str, Any]:
-    """Return the backlash's modes by name: on the flank that pulls."""
+    """Return the symbols that say where the backlash is, by name, with their values.
+
+    It is on the flank that pulls.
+    """
     ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
     return {ahead: 1.0, behind: 0.0}
 
@@ -98,8 +104,9 @@ def _on_flank() -> dict[str, Any]:
 def compensator(flat: Mapping[str, Any], members: int) -> System:
     """Return the controller, from reference and measurements to the force [N].
 
-    Inputs are the reference, position [m] and velocity [m/s] of the stage, and velocity [m/s], acceleration [m/s^2]
-    and jerk [m/s^3] of the reference. Raises InputError for a controller that exerts no force.
+    Inputs are the reference, position [m] and velocity [m/s] of the stage, and velocity [m/s], acceleration [m/s^2] and
+    jerk [m/s^3] of the reference. There are `members` equal ones, unless keys are arrays. Raises InputError for a
+    controller that exerts no force.
     """
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
@@ -116,9 +123,9 @@ def reference_derivatives(control: System) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Plant:
-    """The model's own equations with a force in place of the controller.
+    """The model's own equations in symbols, with a force in place of the controller.
 
-    It has the names of all velocities, and of position and velocity of the cart and of the motor (none without a
+    It has the names of all velocities, and of position and velocity of the cart and of the motor (None without a
     transmission).
     """
 
@@ -153,7 +160,7 @@ def _plant(form: Structure) -> _Plant:
 
 
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the names of position and velocity of the body with friction."""
+    """Return the names of the states that are position and velocity of the body with friction."""
     return _plant(shared_structure(flat).standing).cart
 
 

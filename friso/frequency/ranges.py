@@ -16,7 +16,10 @@ Range = tuple[float, float]
 
 
 def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> tuple[Range, ...]:
-    """Return the ranges of ascending positive places (n,) in which a function is below 0."""
+    """Return the ranges in which a function is below 0, with their ends located.
+
+    `at` are ascending positive arguments (n,) at which `excess`, the function, is evaluated first.
+    """
     values = excess(at)
     below = values < 0
     changes = np.flatnonzero(below[1:] != below[:-1])
@@ -32,7 +35,7 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
 
 
 def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
-    """Return the zero of a function between two places, from its values at these places."""
+    """Return the zero of the function `excess` between two arguments, from its values there."""
     settings = FrequencySettings.current()
     precise = settings.end_precision * np.log(at[-1] / at[0])
     while np.log(at[-1] / at[0]) > precise:

@@ -33,10 +33,10 @@ from friso.stage.standstill import FrictionSettings
 
 @dataclass(frozen=True)
 class Lifted:
-    """A periodic system at the ends of its periods: x' = a x + b u, y = c x + d u.
+    """A system of a drive over the period of its loops: x' = a x + b u, y = c x + d u.
 
-    u and y hold the N samples of a period. Shapes are a (members, n, n), b (members, n, N), c (members, N, n), and d
-    (members, N, N).
+    x' is x one period later; u and y hold the N samples of a period. Shapes are a (members, n, n), b (members, n, N), c
+    (members, N, n), and d (members, N, N).
     """
 
     a: np.ndarray
@@ -51,7 +51,10 @@ class Lifted:
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def over(self, turn: np.ndarray) -> Complex:
-        """Return the matrices at frequencies at which a signal turns by `turn` [rad] (k,) a sample."""
+        """Return the transfer matrices at frequencies given by a signal's `turn` [rad] in a sample.
+
+        `turn` has the shape (k,), and the result (members, k, N, N).
+        """
         return self.at(np.exp(1j * turn * self.d.shape[-1]))
 
     def fundamental(self, turn: np.ndarray) -> Complex:
@@ -70,16 +73,21 @@ class Lifted:
 
 
 def _fundamental(matrices: Complex, turn: np.ndarray) -> Complex:
-    """Return the response of lifted matrices (members, k, N, N) at a signal's own frequency."""
+    """Return the response to a harmonic signal at its own frequency, shape (members, k).
+
+    `matrices` are transfer matrices over a period, (members, k, N, N), at frequencies at which the signal turns by
+    `turn` [rad] in a sample.
+    """
     turns = np.exp(1j * turn[:, None] * np.arange(matrices.shape[-1]))  # (k, N)
     answers = (matrices @ turns[..., None])[..., 0]
     return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
 
 
 def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
-    """Return the eigenvalue closest to the fundamental, shape (members, k).
+    """Return the characteristic locus that follows the response of a loop, shape (members, k).
 
-    The lifted matrices have the shape (members, k, N, N).
+    It is the eigenvalue closest to the response to a harmonic signal at its own frequency. `matrices` are transfer
+    matrices over a period, (members, k, N, N); the signal turns by `turn` [rad] in a sample.
     """
     if matrices.shape[-1] == 1:
         return matrices[..., 0, 0]
@@ -89,11 +97,11 @@ def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
-    """Return the controller at each sample of a period.
+    """Return the controller of a drive at each sample of the period of its loops.
 
-    Its inputs are the measured position and the position from which the velocity is taken [m], its outputs the force
-    [N] and the numbers held for the next sample. A controller that feeds back one encoder's position does not use the
-    second input.
+    Its inputs are the measured position and the position from which the velocity is taken [m]. Its outputs are the
+    force [N] and the numbers held for the next sample. A controller that feeds back one encoder's position does not use
+    the second input.
     """
     form = shared_structure(flat)
     assert form.controller is not None
@@ -120,9 +128,9 @@ def _samples(flat: Mapping[str, Any], name: str) -> int:
 
 @cache
 def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_samples: int) -> Declared:
-    """Return the controller at a sample at which some loops are due, for small motions.
+    """Return the equations of a controller at a sample at which some loops are `due`.
 
-    With `both`, the two measured positions are distinguished.
+    They are for small motions. With `both`, the two measured positions are distinguished.
     """
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
     y, rated = sp.symbols("measured_position measured_rated", real=True)
@@ -136,7 +144,10 @@ def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_
 
 
 def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
-    """Return how the states of the closed loop change over a period, (members, n, n)."""
+    """Return by what matrix the states of the closed loop change over a period, (members, n, n).
+
+    `machine` is the plant, and `controls` the controller at each sample of the period.
+    """
     whole = _identity(machine, controls[0])
     for control in controls:
         whole = _step(machine, control, 1.0) @ whole
@@ -144,7 +155,7 @@ def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndar
 
 
 def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
-    """Return the loop cut at the actuator, over a period.
+    """Return the loop over a period of its drive, cut at the actuator.
 
     It leads from the forces of a period to the controller's forces, with the sign reversed.
     """
@@ -156,9 +167,9 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
 
 
 def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
-    """Return the controller over a period, from one measured channel to the forces.
+    """Return the controller over a period, from one measured signal to the forces.
 
-    The channel is STAGE or RATED.
+    The signal `measured` is STAGE or RATED.
     """
     seen = [control.take((measured,), (FORCE,)) for control in controls]
     lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
@@ -169,7 +180,7 @@ def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifte
 
 
 def unseen(control: System, measured: str) -> System:
-    """Return the controller with one of its inputs cut."""
+    """Return the controller without the input `measured`, which no longer has an effect."""
     column = control.inputs.index(measured)
     b, d = control.b.copy(), control.d.copy()
     b[..., column] = d[..., column] = 0.0
@@ -177,7 +188,7 @@ def unseen(control: System, measured: str) -> System:
 
 
 def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:
-    """Lift a system over a period, from its samples: x' = step x + push u, y = answer x."""
+    """Combine a system's samples over a period: x' = step x + push u, y = answer x at each one."""
     count, (members, n) = len(steps), steps[0].shape[:2]
     along = np.broadcast_to(np.eye(n), (members, n, n))
     inputs = np.zeros((members, n, count))  # from the inputs so far to the present state
@@ -190,9 +201,9 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 
 
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
-    """Return how the states of plant and controller change over a sample.
+    """Return by what matrix the states of plant and controller change over a sample.
 
-    `shut` is 1 if the loop is closed, so that the controller's force acts.
+    `shut` is 1 if the loop is closed, so that the controller's force acts, and 0 if it is cut.
     """
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))

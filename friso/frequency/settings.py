@@ -148,7 +148,7 @@ class FrequencySettings(Settings):
     """Members computed together. Larger arrays leave the processor's cache."""
 
     family_density: int = setting(35, "1/decade")
-    """Frequencies per decade for a family. They find the closest members, whose margins are then computed exactly."""
+    """Frequencies per decade for a family. They find the states closest to -1, whose margins are then exact."""
 
     members_solved_whole: int = setting(16, "")
     """Members for which all frequencies are solved at once, limited by memory."""

@@ -18,7 +18,7 @@ def in_series(first: Any, second: Any) -> Any:
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with joint and limiter in series as its joint, as Table 1 prints.
+    """Return a stage's keys with joint and limiter in series as its joint, as Table 1 prints.
 
     Stiffness and damping are k1 k2 / (k1 + k2), and the limiter never touches.
     """

@@ -1,4 +1,4 @@
-"""Represent many linear systems of one kind at once, as arrays with one member per row."""
+"""Represent many linear systems with equal states at once: arrays with one system per row."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Complex = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class System:
-    """Linear systems x' = a x + b u, y = c x + d u, one for every member.
+    """Linear systems x' = a x + b u, y = c x + d u, as many as there are members.
 
     a (members, n, n), b (members, n, m), c (members, p, n), d (members, p, m), with the names of states, inputs and
     outputs. For a sampled system x' is the next x.
@@ -35,7 +35,7 @@ class System:
         return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
 
     def sees(self, name: str) -> bool:
-        """Tell whether any state or output depends on an input."""
+        """Tell whether any state or output depends on the input with this name."""
         column = self.inputs.index(name)
         return bool(self.b[..., column].any() or self.d[..., column].any())
 

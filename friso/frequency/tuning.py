@@ -34,7 +34,7 @@ class Tuning:
 
     @property
     def parallel(self) -> dict[str, float]:
-        """Return the tuning as gains of Eq. 6: kp [N/m], ki [N/(m s)], kd [N s/m], tau [s].
+        """Return the gains of Eq. 6 by name: kp [N/m], ki [N/(m s)], kd [N s/m], tau [s].
 
         They act on the error behind the low-pass.
         """

@@ -54,8 +54,8 @@ class Kick:
 class MoveShare:
     """Fraction of moves that end in hunting.
 
-    `count` moves were drawn evenly over two keys of the motion, within `ranges` [SI], and run to their end; `hunting`
-    of them hunt.
+    Moves were drawn evenly over two keys of the motion, within `ranges` [SI], and simulated. `count` of them have a
+    certain end, and `hunting` of these hunt.
     """
 
     count: int
@@ -64,7 +64,7 @@ class MoveShare:
 
     @property
     def fraction(self) -> float:
-        """Return the fraction of completed moves that end in hunting."""
+        """Return the fraction of moves with a certain end that hunt."""
         return self.hunting / self.count
 
     @property
@@ -78,12 +78,13 @@ def ends_in(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run stages, and find which of them end in one of their attractors.
 
-    The stages are flat keys to SI numbers or arrays (count,). A run ends in an attractor if, long after its motion, it
-    swings by at least half of the smallest attracting swing, peak to peak. Returns which runs end there, which were
-    completed, and the peak-to-peak swing [m] at the end, all of shape (count,).
+    The stages are flat keys, such as "friction.static", with SI numbers or arrays (count,). A run ends in an attractor
+    if, long after its motion, it swings by more than half of the smallest attracting swing, peak to peak. Returns which
+    runs end there, which were completed, and the peak-to-peak swing [m] at the end, all of shape (count,).
 
     `target` is common to all runs, or has one row for each. Where swings were only observed, half of each run is
-    inspected, because the swing may come less often. `options` are those of `RunOptions`.
+    inspected, because the swing may come less often. `starts` are initial states (count, states); None: those of the
+    motion. `options` are those of `RunOptions`.
     """
     ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
     observed = np.broadcast_to(target.observed, (count,))
@@ -99,9 +100,10 @@ def ends_in(
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages towards closed orbits, as `ends_in` does.
+    """Run stages whose attractors are closed orbits; find which runs end there.
 
-    Runs are judged early; a run that has not reached an orbit by then is continued, twice as long each time.
+    Runs are judged early; a run that has not reached an orbit by then is continued, twice as long each time. Returns
+    which runs end there, which were completed, and the peak-to-peak swing [m], all of shape (count,).
     """
     settings = BasinSettings.current()
     size, lasting, early, last = (
@@ -126,7 +128,11 @@ def _ends_closed(
 def _ends_observed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages at a tighter tolerance towards observed swings, as `ends_in` does."""
+    """Run stages whose attractors were only observed; find which runs end there.
+
+    The tolerance is tighter than for closed orbits. Returns which runs end there, which were completed, and the
+    peak-to-peak swing [m], all of shape (count,).
+    """
     settings = BasinSettings.current()
     after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
     swing, completed, _ = _last_swing(flat, after, settings.judged_periods * target.period, starts, TIGHT, **options)
@@ -157,7 +163,7 @@ def _last_swing(
     """Run stages to the time `end` [s]; measure peak to peak over `last` [s] before it.
 
     Both times have the shape (count,). Returns the swing [m], which runs were completed, and the final states, (count,
-    kept).
+    kept). `starts` are initial states (None: those of the motion).
     """
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))
@@ -178,11 +184,11 @@ def _caught(
     landing_map: LandingMap | None,
     starts: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs end in an attractor, and for which this is known, both (count,).
+    """Return which runs end in an attractor, and for which that is certain, both (count,).
 
-    The return map decides where it is reliable, long runs elsewhere. The end of a run is unknown if at its end the run
-    swings by more than `widest`, peak to peak [m], because it may then grow or decay. It is also unknown if the run
-    swings less often than an observed attractor.
+    The return map decides where it is reliable, long runs elsewhere. The end is uncertain if the run then swings by
+    more than `widest`, peak to peak [m], because it may grow or decay. It is also uncertain if the run swings less
+    often than an observed attractor.
     """
     ends, decided = np.zeros(count, bool), np.zeros(count, bool)
     if landing_map is not None:
@@ -197,14 +203,15 @@ def _caught(
 def displacements_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> Kick:
-    """Find the displacements [m] from which a released stage ends in its `target`.
+    """Find the displacements [m] from which a released stage ends in hunting.
 
-    Swings wider than `widest`, peak to peak [m], count as unknown. A resolved return map saves long runs.
+    `target` is how far and how late a run must swing to count as hunting. Runs that swing wider than `widest`, peak to
+    peak [m], count as unknown. A `landing_map`, the stage's return map, saves long runs.
     """
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Release the stage from displacements; return which hunt, and which are known."""
+        """Release the stage from displacements [m]; return which hunt, and which are certain."""
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
     return kick_windows(hunts, target.amplitude)
@@ -216,7 +223,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Run the stage from displacements; return which diverge, and which are known."""
+        """Run the stage from displacements [m]; return which diverge, and which are certain."""
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
@@ -227,15 +234,15 @@ def displacements_that_run_away(stage: Stage) -> Kick:
 def pushes_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> Kick:
-    """Find the pushes after which a stage at rest ends in its `target`.
+    """Find the pushes, velocities [m/s] of all masses, after which a stage at rest hunts.
 
-    Pushes are velocities [m/s] of all masses. Swings wider than `widest`, peak to peak [m], count as unknown. A
-    resolved return map saves long runs.
+    `target` is how far and how late a run must swing to count as hunting. Runs that swing wider than `widest`, peak to
+    peak [m], count as unknown. A `landing_map`, the stage's return map, saves long runs.
     """
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Push the stage at velocities; return which hunt, and which are known."""
+        """Push the stage at velocities [m/s]; return which hunt, and which are certain."""
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))
@@ -244,10 +251,10 @@ def pushes_that_hunt(
 
 
 def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
-    """Find the windows of kicks that hunt, and narrow down their edges.
+    """Find the windows of kicks that hunt, and narrow down their edges to 1 %.
 
-    The search covers a grid around the kick `unit`. `hunts` runs some kicks; it returns which of them hunt and which
-    runs were completed.
+    The search covers a range of sizes around the kick `unit`, in [m] or [m/s]. `hunts` runs some kicks; it returns
+    which of them hunt, and for which that is certain.
     """
     settings = BasinSettings.current()
     tried = np.geomspace(settings.kick_range[0] * unit, settings.kick_range[1] * unit, settings.kick_count)
@@ -273,10 +280,11 @@ def kick_windows(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], u
 def moves_that_hunt(
     stage: Stage, target: Target, widest: float = np.inf, landing_map: LandingMap | None = None
 ) -> MoveShare | None:
-    """Estimate the fraction of moves around the stage's own that end in the `target`.
+    """Estimate the fraction of moves like the stage's own that end in hunting.
 
-    Swings wider than `widest`, peak to peak [m], are left out. A resolved return map saves long runs. Returns None for
-    motions that are no moves, or if every run fails.
+    `target` is how far and how late a run must swing to count as hunting. Runs that swing wider than `widest`, peak to
+    peak [m], are left out. A `landing_map`, the stage's return map, saves long runs. Returns None for motions that are
+    no moves, or if every run fails.
     """
     settings = BasinSettings.current()
     flat = stage.flat()

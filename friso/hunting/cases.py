@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Solver:
-    """Report of the solver on a run: status in words, steps attempted and rejected, tolerance."""
+    """What the solver reports on a run: status in words, steps tried and rejected, tolerance."""
 
     status: str
     steps: int
@@ -126,7 +126,7 @@ class Case:
 
 
 PART_COUNT = len(PARTS) + 1
-"""Number of parts of a case: the parts of its verdict, and its margin in static friction."""
+"""Number of parts of a check: the parts of its verdict, and its margin in static friction."""
 
 
 LONG_RUN_RTOL = ToleranceSettings().long_run_rtol
@@ -158,7 +158,10 @@ def check(
     done = Tally(progress, len(different) * PART_COUNT)
 
     def judged(variant: Stage) -> Case:
-        """Check a variant of the stage within its fraction of the work."""
+        """Check a variant of the stage within its fraction of the work.
+
+        A variant is the stage as given, with its joint locked, or with it free.
+        """
         names = [name for name, other in variants.items() if other == variant]
         share = _share(variant) if len(different) > 1 else 1.0
         return _case(
@@ -175,16 +178,16 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
 
 
 def _share(stage: Stage) -> float:
-    """Return the fraction of a check's work for the case with its joint locked, or free."""
+    """Return the fraction of a check's work for this case: one with a free joint, or another."""
     settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
     return settings.free_work_share if free else 1 - settings.free_work_share
 
 
 def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -> Case:
-    """Check a stage with its joint as in its file; `progress` is called as parts end.
+    """Check a stage with its joint as in its file, without its margin in static friction.
 
-    Raises InputError for an unusable `rtol`.
+    `progress` is called as parts end. Raises InputError for an unusable `rtol`.
     """
     checked_rtol(rtol)
     kernels(_needed(stage))
@@ -192,7 +195,7 @@ def check_given(stage: Stage, rtol: float = RTOL, progress: Progress = silent) -
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
-    """Return the kernels for one case."""
+    """Return the kernels for a check of the stage as it is, without variants of its joint."""
     return kernels_to_judge(structure(stage.flat()))
 
 
@@ -205,9 +208,10 @@ def _case(
     tell: Callable[[Verdict], None] = lambda verdict: None,
     margins: bool = False,
 ) -> Case:
-    """Check one stage within some work.
+    """Check one stage, within an amount of work.
 
-    `tell` is called with the verdict; `done` counts the parts.
+    `done` counts the parts of the check. `tell` is called with the verdict as soon as it is certain. With `traces` the
+    time response is kept, and with `margins` the margin in static friction is computed.
     """
     survey_settings = SurveySettings.current()
     flat, ended = stage.flat(), 0
@@ -277,9 +281,10 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 
 
 def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
-    """Return the margin in static friction, and whether it holds at the advised bandwidth.
+    """Find what static friction starts or ends hunting, and whether the advice allows for it.
 
-    Each part has an allowance of work and is None if that does not suffice.
+    The second result is true if a stage with the advised bandwidth does not hunt with somewhat other static friction.
+    It is None if there is no such advice. Each result is None if its allowance of work does not suffice.
     """
     settings = CheckSettings.current()
     with allowance(settings.friction_margin_work_share * work):
@@ -294,10 +299,10 @@ def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[Paramete
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
-    """Return the force limit [N] that holds a stage off its reference for ever, or None.
+    """Return the controller's force limit [N] if it holds the stage off its reference, or None.
 
-    The limit does so if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. A
-    stage that settles, swings, or may still move gives None.
+    It does so if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. The
+    result is None for a stage that settles, swings, or may still move.
     """
     settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
@@ -314,7 +319,8 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
 def _breakaway(flat: Mapping[str, Any]) -> float:
     """Return the smallest actuator force [N] that may move a sticking stage; 0 without friction.
 
-    Constant forces may help the actuator, and friction may be smaller in one direction.
+    Constant forces may help the actuator, and friction may be smaller in one direction. `flat` has the stage's keys in
+    SI.
     """
     if leading_friction(flat)["friction.model"] == "none":
         return 0.0

@@ -20,8 +20,8 @@ from friso.hunting.settings import EdgeSettings
 class CycleDerivatives:
     """The limit cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
 
-    It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` tells
-    whether it is stable; `amplitude` [m] and `period` [s] are its size.
+    It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` is true if
+    it is stable; `amplitude` [m] and `period` [s] are its size.
     """
 
     attracts: bool
@@ -33,10 +33,10 @@ class CycleDerivatives:
 
 @np.errstate(all="ignore")
 def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: float) -> CycleDerivatives | None:
-    """Differentiate a stage's cycle by some of its flat keys, with runs to a relative tolerance.
+    """Differentiate a stage's cycle by some of its keys; None if no cycle could be closed.
 
-    Derivatives are exact: variational equations along the keys, with saltation at kinks. Returns None if no cycle could
-    be closed.
+    `flat` has the stage's keys, such as "friction.static", in SI. Runs have the relative tolerance `rtol`. Derivatives
+    are exact: variational equations along the keys, which take account of kinks, where derivatives jump.
     """
     stages = Ensemble.held(flat, 1)
     cycles = find_cycles(stages)
@@ -65,10 +65,10 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
 def flow_derivatives(
     stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray, rtol: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Follow a stage from a state (1, states) for a time [s] (1,), with derivatives.
+    """Run a stage from a state (1, states) for a time [s] (1,), with derivatives of its end.
 
-    Returns the final state (states,), its derivatives by the start (states, states) and by flat keys (states, keys).
-    None if a run was not completed.
+    Returns the final state (states,), its derivatives by the start (states, states), and its derivatives by `keys` such
+    as "friction.static", (states, keys). Returns None if a run was not completed.
     """
     from friso.equations.variational import along  # SymPy takes 0.3 s to import
 
@@ -111,11 +111,11 @@ def _extremes(
 
 @np.errstate(all="ignore")
 def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: float, rtol: float) -> np.ndarray | None:
-    """Return how the edge of hunting in bandwidth depends on each key, (keys,).
+    """Return how the edge of hunting in bandwidth depends on each key, shape (keys,).
 
-    The result is the relative change of the edge per change of the key. The edge lies at `factor` times the bandwidth
-    of the stage, everything else unchanged. Along the edge the multiplier keeps its value; its derivatives are central
-    differences of an exact derivative of the flow. Returns None if no cycle flips there.
+    The result is the relative change of the edge per relative change of the key. The edge lies at `factor` times the
+    bandwidth of the stage, everything else unchanged. Along the edge the multiplier keeps its value; its derivatives
+    are central differences. Returns None if no cycle flips there.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))
@@ -141,9 +141,10 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 def _multipliers(
     inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles, rtol: float
 ) -> np.ndarray | None:
-    """Return the multipliers, (stages,), of stages that differ slightly from one.
+    """Return the largest multiplier of stages that differ slightly from one stage, (stages,).
 
-    `first` is the cycle of that stage. Returns None if an orbit could not be closed, or a multiplier is complex.
+    `inside` is that stage, as keys and SI values; `changed` lists the changes, and `first` is its cycle. Returns None
+    if an orbit could not be closed, or a multiplier is complex.
     """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}

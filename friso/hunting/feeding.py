@@ -1,7 +1,7 @@
 """Find the cause that feeds a stage's hunting: dry friction or the backlash.
 
-Each cause is scaled down separately, step by step, and the stage is surveyed at every step, because the cycle may
-change its form on the way. Viscous friction stays, because it only damps.
+Each cause is scaled down separately, step by step. The stage is surveyed at every step, because the cycle may change
+its form on the way. Viscous friction stays, because it only damps.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class Decline:
     """How hunting declines as one cause is scaled down.
 
     `lasts` is the smallest scale at which the stage still hunts. `gone` is the largest scale below `lasts` at which it
-    does not hunt: None if it hunts down to the last scale, and 0 if the cycle shrinks in proportion to its cause.
-    `certain` tells whether all surveys were certain.
+    does not hunt. It is None if the stage hunts down to the last scale, and 0 if the cycle shrinks in proportion to its
+    cause. `certain` is true if all surveys down to there were certain.
     """
 
     lasts: float
@@ -70,7 +70,7 @@ def _without_friction(stage: Stage) -> Decline:
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the keys that scale the dry friction of guide and motor.
+    """Return the keys that scale the dry friction of guide and motor, such as "friction.static".
 
     They are the friction forces and the bristle stiffnesses, so that bristles become softer in proportion.
     """
@@ -84,7 +84,7 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
-    """Survey a stage with some keys scaled in steps, and return how hunting declines."""
+    """Survey a stage with `keys` scaled down in steps, and return how hunting declines."""
     settings = CheckSettings.current()
     scaled = {**flat, **{key: flat[key] * np.array(settings.feeding_shares) for key in keys}}
     attracted = find_attractors(scaled, len(np.array(settings.feeding_shares)))

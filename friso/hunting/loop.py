@@ -29,16 +29,15 @@ def winds_up_at_a_limit(stages: Ensemble) -> bool:
 
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
-    """Return the stability of loops far beyond a force limit, words (count,).
+    """Judge loops far beyond a force limit without anti-windup: a `LowerGains` each, (count,).
 
-    There is no anti-windup. Swings grow if the loop is unstable there, and shrink if it is stable. Returns None if
-    there is no such limit.
+    Large swings grow if the loop is unstable there, and shrink if it is stable. Returns None if there is no such limit.
     """
     return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
 
 def may_run_away(stages: Ensemble) -> np.ndarray:
-    """Tell which stages may diverge beyond a force limit without anti-windup, shape (count,).
+    """Return which stages may diverge beyond a force limit without anti-windup, shape (count,).
 
     Their loop at lower gains is unstable or unknown. All are False without such a limit.
     """
@@ -47,7 +46,7 @@ def may_run_away(stages: Ensemble) -> np.ndarray:
 
 
 def surely_run_away(stages: Ensemble) -> np.ndarray:
-    """Tell which stages surely diverge beyond a force limit without anti-windup, (count,).
+    """Return which stages surely diverge beyond a force limit without anti-windup, (count,).
 
     Their loop at lower gains is unstable. All are False without such a limit.
     """
@@ -60,8 +59,8 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
     Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains, with the viscous friction of the
-    direction that has less. The result is "unknown" if the controller does not name the keys of its gain, or acts
-    differently about the reference than far from it, which the linear loop at rest does not show.
+    direction that has less. The result is "unknown" if the controller does not name the keys of its gain. It is so too
+    if the controller acts differently near the reference and far from it, which the linear loop at rest does not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
     the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m
@@ -77,9 +76,9 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
 
 
 def _at_lower_gains(stages: Ensemble) -> np.ndarray:
-    """Judge the stability at lower gains of few stages with a known gain key.
+    """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
-    The stages are few enough for the memory.
+    The stages are few enough for the memory, and their controller names the keys of its gain.
     """
     settings = CheckSettings.current()
     shares = np.geomspace(*settings.lower_gain_shares)
@@ -117,9 +116,9 @@ def leaves_for_good(stage: Stage) -> bool:
 
 @np.errstate(all="ignore")  # absurd gains leave infinities behind
 def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
-    """Return which stages have an unstable loop in each state, shape (count,).
+    """Return which stages have an unstable loop while they stick and while they slide, (count,).
 
-    A swing is damped by the mean viscous friction of both directions.
+    A sliding stage is damped by the mean viscous friction of both directions.
     """
     limit = CheckSettings.current().least_growth_rate * stages.number("rate")
     return {state: growth > limit for state, growth in _growths(stages).items()}
@@ -166,7 +165,10 @@ def lags(stages: Ensemble) -> np.ndarray:
 
 @np.errstate(all="ignore")
 def _lags(stages: Ensemble) -> np.ndarray:
-    """Tell which controllers without integral lag, for stages few enough for the memory."""
+    """Return which controllers without integral lag, shape (count,).
+
+    The stages are few enough for the memory.
+    """
     from friso.frequency.parts import FORCE, STAGE, VELOCITY, compensator
 
     settings, rate = CheckSettings.current(), stages.number("rate")
@@ -180,18 +182,18 @@ def _lags(stages: Ensemble) -> np.ndarray:
 
 
 def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
-    """Return the fastest growth rates [1/s] in each state, (count,).
+    """Return the fastest growth rates [1/s] of the loop, sticking and sliding, each (count,).
 
-    NaN for equations that are not finite. A limiter may be `touched`.
+    They are NaN for equations that are not finite. The stroke limiter is pressed if `touched`.
     """
     stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
-    """Return the fastest growth rates [1/s] of linear equations, (count, states, states).
+    """Return the fastest growth rate [1/s] of each of several linear systems, shape (count,).
 
-    NaN if they are not finite.
+    `matrices` have the shape (count, states, states); NaN if one is not finite.
     """
     rates = np.full(len(matrices), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2))
@@ -200,16 +202,16 @@ def _growth(matrices: np.ndarray) -> np.ndarray:
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
-    """Return the index of the motor's position (0) or velocity (1).
+    """Return the index of the motor's position (`which` 0) or velocity (1) among the states.
 
-    Without a transmission it is that of the first state.
+    Without a transmission it is 0.
     """
     names = stages.kernel.states
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
-    """Yield the states with one state at a time moved slightly from rest, (count, states)."""
+    """Yield states (count, states) in which one after the other is moved slightly from zero."""
     settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -218,9 +220,9 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
-    """Return the scaled derivatives of the rates at rest by the states, (count, states, states).
+    """Return derivatives of the states' rates of change by the states, (count, states, states).
 
-    A limiter that is `touched` is far enough beyond the stroke.
+    They are taken at rest, and scaled. If `touched`, the stroke limiter is pressed, at twice the stroke.
     """
     settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))
@@ -236,9 +238,10 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return the linear system of a sliding stage, without states of the friction law.
+    """Return the linear systems of sliding stages, without the bristles of the friction law.
 
-    `of_directions` combines the viscous friction of the two directions.
+    `stuck` are the systems of the sticking stages, (count, states, states). `of_directions` combines the viscous
+    friction of the two directions, such as their mean.
     """
     settings = CheckSettings.current()
     kernel, flat = stages.kernel, stages.flat
@@ -268,7 +271,10 @@ def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
 
 
 def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
-    """Return states of stages that have slid at a speed [m/s] until friction is steady."""
+    """Return states of stages that have slid at a speed [m/s] until friction is steady.
+
+    The shape is (count, states).
+    """
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
     begun = stages.rates(states)[:, bristles]

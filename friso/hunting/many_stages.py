@@ -1,7 +1,7 @@
 """Find attractors of many stages of one structure at once, and judge the stages.
 
-Stages are flat keys to SI numbers, or to arrays of shape (count,) where they differ. Fewer starts are used than in
-`friso.hunting.check`, so an attractor with a narrow basin may be missed.
+Stages are a mapping of keys such as "friction.static" to SI numbers, or to arrays (count,) where they differ. Fewer
+starts are used than in `friso.hunting.check`, so an attractor with a narrow basin may be missed.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from friso.hunting.what_attracts import surveyed_roughly
 
 @dataclass(frozen=True)
 class StageAttractors(ArrayRows):
-    """Attractors of many stages that swing for ever, arrays of shape (count,).
+    """What keeps each of many stages swinging for ever, as arrays of shape (count,).
 
     - `attracts`: an attractor was found.
-    - `decided`: every simulation that had to decide was completed.
+    - `decided`: no simulation failed that was needed to answer this.
     - `certain`: decided, and no attractor can exist beyond the range searched.
     - `amplitude` [m], half of peak to peak, and `period` [s]: of the largest swing (NaN: no attractor).
-    - `closed`: the largest swing was closed as an orbit; `multiplier`: its multiplier (NaN: it was not closed).
-    - `target`: the motion that marks a run as hunting (None: stages of this structure cannot hunt).
+    - `closed`: this swing was closed as an orbit; `multiplier`: its multiplier (NaN: it was not closed).
+    - `target`: how far and how late a run must swing to count as hunting (None: these stages cannot hunt).
     """
 
     attracts: np.ndarray
@@ -61,7 +61,7 @@ class StageAttractors(ArrayRows):
 
     @classmethod
     def of(cls, survey: Attractors | None, certain: np.ndarray) -> StageAttractors:
-        """Summarise a survey of stages, given which of them are `certain`, (count,).
+        """Summarise a survey of stages, of which some are `certain`, shape (count,).
 
         A survey of None stands for stages that cannot hunt.
         """
@@ -79,15 +79,15 @@ class StageAttractors(ArrayRows):
 
 
 def can_hunt(flat: Mapping[str, Any]) -> bool:
-    """Tell whether stages of one structure may hunt.
+    """Tell whether stages of one structure may hunt; `flat` has their keys in SI.
 
-    They need friction, integral action that winds up, and a reference that stands still.
+    They need friction, integral action that winds up, and a reference that stands still in the end.
     """
     return not why_not(shared_structure(flat)) and not keeps_moving(flat)
 
 
 def kernels_to_judge(form: Structure) -> set[KernelRequest]:
-    """Return the kernels that verdicts on stages of a structure need, to be built together."""
+    """Return the compiled equations that verdicts on stages of a structure need."""
     variational = set() if why_not(form) else {KernelRequest(form.standing, variational=True)}
     return {KernelRequest(form), KernelRequest(form.standing), *variational}
 
@@ -103,9 +103,10 @@ def find_attractors(
 ) -> StageAttractors:
     """Find one attractor of each stage, for stages of one structure, whatever their own motions.
 
-    Stages whose references never stand still cannot hunt. Orbits are closed to the relative tolerance. Without
-    `close_orbits`, only simulations are used, and motions that have converged count as attracted. `threads` and
-    `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work is used up.
+    `flat` has the stages' keys in SI. Stages whose references never stand still cannot hunt. Orbits are closed to the
+    relative tolerance. Without `close_orbits`, only simulations are used, and motions that have converged count as
+    attracted. `threads` bounds the threads of runs, and setting `cancel` stops them. Raises Exhausted if an allowance
+    of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None
@@ -118,8 +119,9 @@ def sketch_attractors(
 ) -> StageAttractors:
     """Sketch the attractors of stages of one structure by coarse return maps.
 
-    Where these fail, it simulates. A sketch is faster than `find_attractors`, and may miss an attractor with a narrow
-    basin. `threads` and `cancel` as in `RunOptions`. Raises Exhausted if an allowance of work is used up.
+    Where these maps are not reliable, stages are simulated. A sketch is faster than `find_attractors`, and may miss an
+    attractor with a narrow basin. `threads` bounds the threads of runs, and setting `cancel` stops them. Raises
+    Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = surveyed_roughly(stages) if can_hunt(flat) else None
@@ -127,18 +129,19 @@ def sketch_attractors(
 
 
 def find_swings(flat: Mapping[str, Any]) -> tuple[Swinging, ...]:
-    """Find all attractors of one stage, given as flat keys, as thoroughly as a check does.
+    """Find all attractors of one stage as thoroughly as a check does; none if it cannot hunt.
 
-    The stage's own motion does not matter. If an allowance of work is used up, the attractors found so far are
-    returned.
+    `flat` has the stage's keys, such as "friction.static", in SI. Its own motion does not matter. If an allowance of
+    work is used up, the attractors found so far are returned.
     """
     return () if why_not(shared_structure(flat)) else attractors(Ensemble.held(flat, 1), thorough=True).motions
 
 
 def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
-    """Return which stages of one structure have an unstable loop whatever the friction, (count,).
+    """Return which stages of one structure have an unstable loop whatever the friction.
 
-    The loop is unstable while the stage sticks, or while it slides.
+    The result has the shape (count,). The loop is unstable while the stage sticks, or while it slides. `flat` has the
+    stages' keys in SI.
     """
     states = unstable_among(Ensemble.held(flat, count, form=shared_structure(flat)))
     return np.any([*states.values()], axis=0)
@@ -146,10 +149,11 @@ def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
 
 @np.errstate(all="ignore")
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
-    """Judge stages of one structure, whose own motions are run to a relative tolerance.
+    """Judge stages of one structure, whose own motions are run to the relative tolerance `rtol`.
 
-    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion
-    was not simulated to the end. It is "undecided" if its attractors, or the end of its motion, are not certain.
+    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion was not
+    completed. It is "undecided" if its attractors, or the end of its motion, are not certain. `flat` has the stages'
+    keys in SI.
     """
     attracted = find_attractors(flat, count)
     return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
@@ -164,9 +168,11 @@ def judge_runs(
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Judge stages as `judge_many` does, from motions and attractors that are already computed.
+    """Judge stages from motions and attractors that are already computed.
 
-    `rtol` is the relative tolerance of further runs; `threads` and `cancel` as in `RunOptions`.
+    Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion was not
+    completed, or if it is not certain what attracts it. `rtol` is the relative tolerance of further runs. `threads`
+    bounds the threads of runs, and setting `cancel` stops them.
     """
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))
@@ -199,7 +205,7 @@ def judge_runs(
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Continue motions that do not end in an attractor of their stages.
+    """Continue motions that do not end in an attractor of their stages, to see how they end.
 
     Returns which of them keep swinging with a smaller swing, and which certainly keep swinging or rest, both of shape
     (motions,).

@@ -31,7 +31,7 @@ class Margin:
     attractor it is the nearest edge below. `factor` is the bandwidth at the edge over the stage's own. `crossover` [Hz]
     is the crossover there; None for a controller given by its gains, all of whose poles and zeros the factor scales. At
     `quiet`, a factor just above, the stage does not hunt: the edge lies between both. It is `certain` if a closed orbit
-    was followed to its end, or both are close together, and every run that had to decide was completed.
+    was followed to its end, or both are close together, and no run failed that was needed.
     """
 
     factor: float
@@ -41,7 +41,7 @@ class Margin:
 
     @property
     def end(self) -> AttractionEnd:
-        """Return the end of attraction, in factors of the bandwidth."""
+        """Return the bandwidths, over the stage's own, between which attraction ends."""
         return AttractionEnd(self.factor, self.quiet, self.certain)
 
     @property
@@ -52,7 +52,7 @@ class Margin:
 
 @dataclass(frozen=True)
 class SearchedBandwidths:
-    """Result of a search through the bandwidths.
+    """Result of a search through the bandwidths for hunting.
 
     - `margin`: the edge of hunting (None: there is no edge).
     - `windows`: other bandwidths at which the stage hunts.
@@ -84,10 +84,10 @@ def find_margin(stage: Stage, attracting: bool) -> Margin | None:
 
 
 def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
-    """Search the bandwidths of `SEARCH_LIMITS` for attractors.
+    """Search the bandwidths of `SEARCH_LIMITS` for attractors of a stage.
 
-    `survey` is the survey of the stage itself, if there was one. If an allowance of work is used up, the ends are as
-    good as known by then, and not certain.
+    `attracting` is true if something attracts the stage itself, and `survey` is its survey, if there was one. If an
+    allowance of work is used up, the ends are as good as they were by then, and not certain.
     """
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     fine, coarse = SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond
@@ -119,13 +119,13 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 class _Grid:
-    """Factors of the bandwidth, ascending, with the attractors at each.
+    """Ascending factors of the bandwidth, and what attracts the stage at each of them.
 
-    All from number `lowest` on were searched.
+    The factors numbered `lowest` and higher were searched.
     """
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
-        """Survey the stages at factors from number `first` on. Raises Exhausted."""
+        """Survey the stage at the bandwidth factors numbered `first` and higher. Raises Exhausted."""
         self.flat, self.factors, self.lowest = flat, factors, first
         self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
         self.motions: list[list[Swinging]] = [[] for _ in factors]
@@ -143,7 +143,7 @@ class _Grid:
         self.lowest = 0
 
     def _survey(self, numbers: np.ndarray) -> None:
-        """Sketch the stages at factors given by number; simulate stages whose maps are not resolved.
+        """Sketch the stages at factors given by number; simulate those that the sketch leaves open.
 
         Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted.
         """
@@ -167,11 +167,11 @@ class _Grid:
                     raise
 
     def _stages(self, numbers: np.ndarray) -> Ensemble:
-        """Return the stage with its bandwidth multiplied by the numbered factors."""
+        """Return the stage with its bandwidth multiplied by some of the factors, by number."""
         return Ensemble.held(faster(self.flat, self.factors[numbers]), len(numbers))
 
     def record(self, index: int, survey: Attractors) -> None:
-        """Record a thorough survey of the stage at one factor."""
+        """Record a thorough survey of the stage at the bandwidth factor numbered `index`."""
         self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
         self.motions[index] = list(survey.motions)
         self.inspected.add(index)
@@ -181,8 +181,8 @@ class _Grid:
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """Find the last factor at which the stage hunts while it does not at the next one.
 
-        The search starts from a number, upwards if `above`, else downwards. Returns the number, the end of attraction
-        and whether it is certain; None if there is no such factor.
+        Factors from number `index` upwards count if `above`, otherwise those below it. Returns the number, the end of
+        attraction, and whether it is certain; None if there is no such factor.
         """
         while True:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
@@ -203,7 +203,7 @@ class _Grid:
     def _proved_at_the_top(self) -> bool:
         """Tell whether the stage hunts at the highest factor.
 
-        If the allowance is used up before that is decided, the answer is yes.
+        The result is true as well if the allowance is used up before that is decided.
         """
         try:
             return self.proved(len(self.factors) - 1, 1)
@@ -212,10 +212,11 @@ class _Grid:
             return True
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Find the end of attraction between a factor and the next one, above (1) or below (-1).
+        """Find where attraction ends between the bandwidth factor numbered `at` and a neighbour.
 
-        Returns None if attraction reaches the end of the search, which is then recorded for all factors up to there, or
-        if closer inspection shows no attractor. If the allowance is used up, the end is not certain.
+        The neighbour is the next factor above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of
+        the search, which is then recorded for all factors up to there. It does so too if closer inspection shows no
+        attractor. If the allowance is used up, the end is not certain.
         """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
@@ -226,7 +227,11 @@ class _Grid:
             return self.ends.setdefault((at, ahead), end)
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
-        """Follow attraction from a factor to its end (see `end`). Raises Exhausted."""
+        """Follow attraction from the bandwidth factor numbered `at` to its end.
+
+        It is followed up (`ahead` 1) or down (-1). Returns None if attraction reaches the end of the search, or if
+        closer inspection shows no attractor. Raises Exhausted.
+        """
         if not self.proved(at, ahead):
             return None
         outward = EdgeSearch(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
@@ -250,15 +255,19 @@ class _Grid:
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Mark the factors, (count,), past which a stable orbit was followed, as attracting."""
+        """Mark the factors past which a stable orbit was followed as attracting.
+
+        `where`, shape (count,), is true for them.
+        """
         self.passed |= where
         self.attracts |= where
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
-        """Tell whether the stage hunts at the factor numbered `at`, after trying to close orbits.
+        """Tell whether the stage hunts at the bandwidth factor numbered `at`, after closing orbits.
 
-        If it does not, the next factors behind it that seemed to have an attractor are inspected too.
+        If it does not, neighbouring factors that seemed to have an attractor are inspected too: those below if `ahead`
+        is 1, above if it is -1.
         """
         if at not in self.inspected:
             self._inspect(np.array([at]))
@@ -280,7 +289,7 @@ class _Grid:
         self.inspected |= set(numbers.tolist())
 
     def lower_end(self, index: int) -> AttractionEnd | None:
-        """Find the end of attraction below the factor numbered `index`.
+        """Find the end of attraction below the bandwidth factor numbered `index`.
 
         Returns None if attraction reaches the end of the search, or if it is not certain that the stage does not hunt
         below.
@@ -310,6 +319,9 @@ class _Grid:
         )
 
     def _spans(self) -> list[tuple[int, int]]:
-        """Return the first and last numbers of each group of neighbouring factors with an attractor."""
+        """Return the first and last numbers of each group of bandwidth factors with an attractor.
+
+        The factors of a group are neighbours.
+        """
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
         return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

@@ -51,7 +51,7 @@ ones."""
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of runs, each of shape (runs,).
+    """Numbers and words that describe runs, each of shape (runs,).
 
     - `peaks`: the thesis's peak count; `distinct_peaks`: count of distinct peaks (see
       `friso.hunting.criteria.peak_count`).
@@ -79,9 +79,10 @@ class Measures:
 
 
 def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
-    """Return the options for runs that are to be measured, to a relative tolerance.
+    """Return the options for runs that are to be measured, with the relative tolerance `rtol`.
 
-    `threads` and `cancel` as in `RunOptions`. Turning points are kept from a little before the first that may count.
+    `threads` bounds the threads of runs, and setting `cancel` stops them. Turning points are kept from a little before
+    the first that may count.
     """
     return RunOptions(
         rtol=rtol,
@@ -116,7 +117,7 @@ def swing_of(runs: Runs) -> np.ndarray:
 
 
 def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
-    """Return how a chunk of runs ends, for the "inner" or the "outer" band."""
+    """Describe how a chunk of runs ends; `outside` names their band, "inner" or "outer"."""
     return End(
         completed=np.equal(runs.results.statuses, Status.DONE),
         swing=swing_of(runs),
@@ -129,7 +130,10 @@ def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
 
 
 def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
-    """Measure a chunk of runs of the stages `flat`, whose arrays have one entry per run."""
+    """Measure a chunk of runs.
+
+    `flat` has the keys of their stages in SI, with arrays of one entry per run.
+    """
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs, corner_of(flat))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
@@ -165,9 +169,9 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
 def measure_traces(
     flat: Mapping[str, Any], time: np.ndarray, deviation: np.ndarray, force: np.ndarray, solver: SampledSolver
 ) -> Measures:
-    """Measure sampled runs of the stages `flat`, such as those of a drive as built.
+    """Measure sampled runs, such as those of a drive as built.
 
-    Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
+    `flat` has the stages' keys in SI. Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
     end = end_of_traces(time, deviation, BAND, done, corner_of(flat))
@@ -178,7 +182,10 @@ def measure_traces(
     stays = [last_outside(time, deviation, band) + passing < time[-1] for band in BANDS]
 
     def settled(where: list[Stand], number: int) -> np.ndarray:
-        """Return the longest settling time at some places into a band; NaN where it is not reached."""
+        """Return the longest settling time [s] at some places of the reference, (runs,).
+
+        `number` chooses the band. The time is NaN where a run does not settle.
+        """
         times = np.zeros(len(deviation))
         for run, row in enumerate(deviation[:, None]):
             own = [Stand(*(np.ravel(part)[min(run, np.size(part) - 1)] for part in place)) for place in where]

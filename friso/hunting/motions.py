@@ -42,7 +42,7 @@ class Motions(ArrayRows):
 
     @classmethod
     def of(cls, measures: Measures) -> Motions:
-        """Take the motions from runs that were measured."""
+        """Make the results from runs that were measured."""
         completed, away = (np.equal(measures.status, status) for status in (Status.DONE, Status.DIVERGED))
         return cls(completed, away, measures.peaks, measures.peak_to_peak, measures.in_the_end[1])
 
@@ -52,7 +52,7 @@ class Motions(ArrayRows):
 
 
 def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
-    """Run and measure the motions of stages of one structure."""
+    """Run and measure the stages' own motions; `flat` has the keys of `count` stages in SI."""
     columns = [*(np.zeros(count, bool) for _ in range(2)), *(np.full(count, np.nan) for _ in range(3))]
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
         part = Motions.of(measure_runs(runs.part(flat), runs))
@@ -89,7 +89,10 @@ class FollowedMotions:
         return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Continue the motions numbered `which` of the stages `flat` for long. Raises Exhausted."""
+        """Continue the motions numbered `which` for long, and enter the results. Raises Exhausted.
+
+        `flat` has the keys of their `count` stages in SI.
+        """
         settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))
         waits = settings.least_followed_waits * wait(stages, loose_from(stages))
@@ -114,7 +117,7 @@ def followed_motions(
 ) -> FollowedMotions:
     """Continue motions that are not at rest at their end, until an allowance of work is used up.
 
-    If hunting is not `possible`, a stage may also rest off its reference.
+    `flat` has the keys of the stages in SI. If hunting is not `possible`, a stage may also rest off its reference.
     """
     rests, still = np.isfinite(motions.settling), np.zeros(count, bool)
     steady, away, followed = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
@@ -134,18 +137,18 @@ def followed_motions(
 
 
 def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """Return the swings [m] up to which stages of one structure count as at rest, (count,).
+    """Return the peak-to-peak swings [m] up to which stages count as at rest, shape (count,).
 
-    Swings are measured peak to peak.
+    `flat` has the keys of stages of one structure in SI.
     """
     return 2 * SurveySettings.current().least_swing * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
-    """Select some entries of the arrays among the values."""
+    """Select the entries `which` of each array in a mapping; other values stay."""
     return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}
 
 
 def keeps_moving(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the reference of the stages never stands still."""
+    """Tell whether the reference never comes to stand; `flat` has the stages' keys in SI."""
     return not rests(flat)

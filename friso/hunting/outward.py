@@ -24,8 +24,10 @@ from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
 FARTHER = np.array([1.03, 1.06])
-"""Factors beyond the end of an orbit at which attractors are looked for again. Most windows to which no orbit leads lie
-there, and they are narrower than the steps of a search through all bandwidths."""
+"""Factors beyond the end of an orbit at which attractors are looked for again.
+
+Most windows to which no orbit leads lie there, and they are narrower than the steps of a search through all bandwidths.
+"""
 
 
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
@@ -34,7 +36,7 @@ ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 
 
 @dataclass(frozen=True)
 class AttractionEnd:
-    """End of attraction, between two factors of the bandwidth.
+    """Where attraction ends, between two factors of the bandwidth.
 
     The stage has an attractor at `inside` and none at `outside`. The end is `certain` under four conditions: an orbit
     was followed to its end or its loss at `inside`, or an attractor was seen there; no attractor exists at `outside`;
@@ -47,7 +49,7 @@ class AttractionEnd:
 
     @property
     def reserve(self) -> float:
-        """Return the relative error of the end."""
+        """Return the relative error of the end: by what fraction both factors differ."""
         return abs(self.outside / self.inside - 1)
 
 
@@ -62,16 +64,16 @@ class BandwidthWindow:
     high: AttractionEnd | None
 
     def holds(self, factor: float) -> bool:
-        """Tell whether the stage hunts at a factor."""
+        """Tell whether the stage hunts at a factor of its own bandwidth, by this window."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
 
 @dataclass
 class _Place:
-    """Progress of a search: motions at a factor, and a factor that seems to have none.
+    """Progress of a search: the bandwidth with `motions` that it has come to, and one without.
 
-    They are `at` and `outside`.
+    `at` and `outside` are these bandwidths, as factors of the stage's own. At `outside` there seems to be no attractor.
     """
 
     at: float
@@ -87,8 +89,8 @@ class Beyond(Exception):
 class EdgeSearch:
     """Search for an edge of hunting, towards the `farthest` factor of the bandwidth.
 
-    The stage is given as flat keys. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs to
-    another window.
+    `flat` has the stage's keys in SI. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs
+    to another window.
     """
 
     flat: Mapping[str, Any]
@@ -99,7 +101,7 @@ class EdgeSearch:
         """Find the end of attraction between the factors `at`, with motions, and `outside`.
 
         Raises Beyond if an attractor exists up to the end of the search. If an allowance of work is used up, the end is
-        as close as known by then, and not certain; attraction may have been followed past `outside`.
+        as close as it was by then, and not certain; attraction may have been followed past `outside`.
         """
         place = _Place(at, motions, outside)
         try:
@@ -108,7 +110,7 @@ class EdgeSearch:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """Follow orbits from a place to the edge, updating the place on the way."""
+        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way."""
         for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
@@ -125,10 +127,10 @@ class EdgeSearch:
         return self._bracketed(place)
 
     def _proved(self, next_to: float, farther: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, Attractors]:
-        """Look for attractors just beyond the end of an orbit, and farther off.
+        """Look for attractors just beyond an orbit's end, at `next_to`, and at `farther` factors.
 
-        Returns the searched factors and their attractors. Without a map, factors farther off are searched only if a
-        simulation shows an attractor.
+        Returns the searched factors and their attractors. Without a return map, factors farther off are searched only
+        if a simulation shows an attractor. Runs start from `distances` [m], too.
         """
         if farther.size and not has_a_map(self._stages(farther)):
             seen = attractors(self._stages(farther), cycles=False)
@@ -142,7 +144,8 @@ class EdgeSearch:
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
         """Return the factors beyond an orbit's end at which to look for attractors.
 
-        The first is next to the end, the others are farther off.
+        The first is next to the end, the others are farther off. Raises Beyond if the first is beyond the end of the
+        search.
         """
         ahead = self._ahead(end)
         next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
@@ -191,10 +194,10 @@ class EdgeSearch:
         return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
-        """Find the attractors at some factors.
+        """Find the attractors at some factors of the bandwidth.
 
-        Where maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered `confirm`,
-        runs check the maps.
+        Where return maps do not decide, runs also start from `distances` [m], shape (n,). At the factors numbered
+        `confirm`, runs check the maps.
         """
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
@@ -208,10 +211,7 @@ class EdgeSearch:
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:
-        """Return the factor `outside`, or one further ahead if `at` has passed it.
-
-        At `outside` there is no attractor.
-        """
+        """Return `outside`, a factor without attractor, or one farther ahead if `at` has passed it."""
         ahead = self._ahead(at)
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
@@ -227,7 +227,7 @@ class EdgeSearch:
         assert cycles is not None
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at places, which are logarithms of the factor from the start."""
+            """Return the stages at places: logarithms of the bandwidth over that at the start."""
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
@@ -280,6 +280,6 @@ def _nearer(ahead: float, one: float, other: float) -> float:
 
 
 def _kind(first: Point, second: Point) -> Bifurcation:
-    """Return how an orbit loses stability from one point to the next."""
+    """Return how an orbit loses stability from one point to the next: flip, fold or torus."""
     kinds = changes(first, second)
     return kinds[0] if kinds else "torus"

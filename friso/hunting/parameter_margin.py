@@ -29,7 +29,7 @@ class Undecided(Exception):
 
 
 Scaled = Callable[[np.ndarray], Mapping[str, Any]]
-"""Function that returns stages, as flat keys, with their parameter multiplied by factors (count,)."""
+"""Function that returns stages, as keys in SI, with a parameter times factors (count,)."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,10 @@ class MarginEnd:
 
 @dataclass(frozen=True)
 class ParameterMargin:
-    """Range of a parameter over which the verdict on a stage stays: it hunts, or it does not.
+    """Range of a parameter over which a stage keeps hunting, or keeps not hunting.
 
-    `attracts` tells which. `below` and `above` are the nearest factors of the parameter at which that changes (None: at
-    no factor tried up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
+    `attracts` is true if it hunts. `below` and `above` are the nearest factors of the parameter at which that changes
+    (None: at no factor tried up to the end of the `range`). On the `open_sides`, -1 or 1, this is not known.
     """
 
     attracts: bool
@@ -61,23 +61,24 @@ class ParameterMargin:
 
     @property
     def certain(self) -> bool:
-        """Tell whether no side is open and both ends, if any, are certain.
+        """Tell whether no side is open, and both ends, if there are any, are certain.
 
         Ranges between the tried values may still differ.
         """
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 
     def end(self, side: int) -> MarginEnd | None:
-        """Return the end on a side, -1 or 1."""
+        """Return the end below (`side` -1) or above (1) the stage's own value; None without one."""
         return self.below if side < 0 else self.above
 
 
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
-    """Find the margin of a stage in a parameter, from the factor `lowest` to the `highest` one.
+    """Find over what range of a parameter a stage keeps hunting, or keeps not hunting.
 
-    `attracts` tells whether the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows
-    outward, then more closely around a change. Both ends are searched thoroughly. Ranges narrower than these steps may
-    be missed. A side is open if an allowance of work is used up, or the search does not decide.
+    The search runs from the factor `lowest` to the `highest` one. `scaled` makes the stages, and `attracts` is true if
+    the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows outward, then more closely
+    around a change. Both ends are searched thoroughly. Ranges narrower than these steps may be missed. A side is open
+    if an allowance of work is used up, or the search does not decide.
     """
     settings = EdgeSettings.current()
     ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
@@ -133,7 +134,10 @@ class _Side:
         raise Undecided
 
     def _bracketed(self) -> int | None:
-        """Return the number of the first factor with a change, after trying close ones; or None."""
+        """Find the first factor at which hunting has changed; return its number, or None.
+
+        Factors before it are tried until the last one without a change is close.
+        """
         settings = EdgeSettings.current()
         while (changed := np.flatnonzero(self.changed)).size:
             first = int(changed[0])
@@ -143,7 +147,10 @@ class _Side:
         return None
 
     def _finer(self, first: int) -> np.ndarray:
-        """Return factors between the first one with a change and the one before it."""
+        """Return factors to try between the factor numbered `first` and the one before.
+
+        At the first of both hunting has changed, at the other not.
+        """
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
 

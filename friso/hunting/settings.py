@@ -28,7 +28,7 @@ class ToleranceSettings(Settings):
     """Tolerance of repeated runs where only simulations show an attractor. A looser one would be no second opinion."""
 
     landing_rtol: float = setting(1e-6, "")
-    """Tolerance of runs that find landings. They scatter by less than the gaps between points of a map."""
+    """Tolerance of runs that find where stages stick. They scatter by less than the gaps between points of a map."""
 
     sketch_rtol: float = setting(1e-5, "")
     """Tolerance of sketches, which separate hunting from settling but do not locate the edge."""
@@ -217,7 +217,7 @@ class CheckSettings(Settings):
 
     lag_angle: float = setting(1e-3, "rad")
     """Phase lag of the force behind the error from which a controller counts as a lag. With a smaller one, the force at
-    standstill exceeds the force of a slip by only a few thousandths, so the slip stops even if Coulomb friction is a
+    standstill exceeds that of a slip by only a few thousandths. So the slip stops even if Coulomb friction is a
     hundredth of static friction."""
 
     lag_rates: tuple[float, float] = setting((1e-6, 30.0), "natural frequencies")
@@ -259,11 +259,10 @@ class TrackingSettings(Settings):
     """Newton steps, or equal waits, after which a periodic response is abandoned."""
 
     periods_waited: int = setting(4, "periods")
-    """Periods of a plain run where kinks of friction keep a Newton step from coming closer."""
+    """Periods of a plain run where jumps of friction's derivatives keep a Newton step from coming closer."""
 
     derivative_step: float = setting(1e-4, "of the scales of the states")
-    """Step of numerical derivatives. Smaller ones are lost in the tolerance; larger ones reach across kinks of
-    friction."""
+    """Step of numerical derivatives. Smaller ones are lost in the tolerance; larger ones cross jumps of derivatives."""
 
     closed_distance: float = setting(1e-4, "of the scales of the states")
     """Largest distance between states one period apart on a closed response, of which three digits are shown."""

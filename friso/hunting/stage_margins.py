@@ -21,10 +21,11 @@ JOINT_KEYS = "joint.stroke", "joint.stiffness"
 
 
 def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | None:
-    """Find the margin of a stage in static friction, with its Coulomb friction unchanged.
+    """Find how much more or less static friction starts or ends hunting, Coulomb friction held.
 
-    The range runs from static friction equal to Coulomb friction up to a multiple given by `SEARCH_LIMITS`. Returns
-    None if the friction law lacks one of both, if the stage cannot hunt, or if its attractors are unknown.
+    The range runs from static friction equal to Coulomb friction, or a fraction given by `SEARCH_LIMITS`, to a
+    multiple. Returns None if the friction law lacks one of both, if the stage cannot hunt, or if its attractors are
+    unknown.
     """
     flat = stage.flat()
     if not static_frictions(flat) or not _is_known(judgement):
@@ -34,10 +35,10 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 
 
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
-    """Return the margins of a stage with a free joint in stroke and stiffness, by key.
+    """Find what change in stroke and stiffness of a free joint starts or ends hunting.
 
-    The range is given by `SEARCH_LIMITS`. The result is empty for a stage that cannot hunt, or whose attractors are
-    unknown.
+    The range is given by `SEARCH_LIMITS`. The margins are listed by key. There is none for a stage that cannot hunt, or
+    whose attractors are unknown.
     """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
@@ -52,7 +53,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
 
 
 def _is_known(judgement: Judgement) -> bool:
-    """Tell whether it is known if the stage has attractors, for a stage that may hunt."""
+    """Tell whether a stage may hunt, and it is certain whether something attracts it."""
     hunting, unclear = judgement.hunting, judgement.observed and judgement.hunting.target is None
     failed = judgement.verdict == "failed" or judgement.runs_away or hunting.passing
     return hunting.possible and hunting.certain and not failed and not unclear
@@ -60,15 +61,18 @@ def _is_known(judgement: Judgement) -> bool:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMargin:
-    """Find the margin in a parameter of a stage whose own attractors are known."""
+    """Find what change of a parameter starts or ends hunting of a stage with a certain verdict.
+
+    `scaled` makes the stages, and `lowest` is the smallest factor of the parameter.
+    """
     return parameter_margin(scaled, judgement.hunting.target is not None, lowest, SEARCH_LIMITS.most_friction)
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether a stage with a faster controller keeps its margin in static friction.
+    """Tell whether a stage with a controller faster by `factor` stays quiet at other friction.
 
-    The controller is faster by `factor`; static friction is multiplied and divided by the factor by which advice keeps
-    away from an edge. Returns None if this takes more than the given work, or is not certain.
+    Static friction is multiplied and divided by the factor by which advice keeps away from an edge. Returns None if
+    this takes more than the given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

@@ -22,10 +22,11 @@ from friso.stage.motion import DURATION, motion_of
 
 @dataclass(frozen=True)
 class Dwell:
-    """A place at which the reference stands: `number` from 1, position [m], duration [s].
+    """A place at which the reference stands, and how the stage settles there.
 
-    The reference stands from the time `since` [s]. `settling` has for each band [m] the time [s] until the stage stays
-    within the band; None if it does not while the reference stands.
+    `number` counts these places from 1, at a `position` [m]. The reference stands there from the time `since` [s].
+    `settling` has for each band [m] the time [s] until the stage stays within the band; None if it does not while the
+    reference stands.
     """
 
     number: int
@@ -42,7 +43,7 @@ class Dwell:
 
 @dataclass(frozen=True)
 class Reversal:
-    """A reversal of the reference: time [s], place [m], and error [m].
+    """A reversal of the reference, at a time [s] and a position [m], and the error after it [m].
 
     The error is the largest one until half-way to the next reversal.
     """
@@ -128,7 +129,7 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
     """Return how a stage follows a moving reference; None if its run was not completed.
 
     For a periodic reference, Newton's method closes the response of equal period, from the end of the stage's own
-    motion. The residual is the difference between states one period apart.
+    motion.
     """
     flat, settings = stage.flat(), TrackingSettings.current()
     shape, period = kernel(structure(flat)), motion_of(flat).period(flat)
@@ -159,7 +160,10 @@ def tracking(stage: Stage, rtol: float) -> Tracking | None:
 def _reversals(
     flat: Mapping[str, Any], time: np.ndarray, error: np.ndarray, span: tuple[float, float]
 ) -> tuple[Reversal, ...]:
-    """Return the reversals of a reference in a time span, each with the error behind it."""
+    """Return the reversals of a reference in a span of time [s], each with the error after it.
+
+    `error` [m] belongs to the times `time` [s], both of shape (n,).
+    """
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
     reversals = []
     for corner, following in zip(corners, np.append(corners, flat[DURATION])[1:], strict=True):
@@ -173,7 +177,10 @@ def _reversals(
 
 
 def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) -> tuple[np.ndarray, float] | None:
-    """Return start (1, kept) and multiplier of a periodic response; None if not closed."""
+    """Close the response of a stage to a periodic reference; None if that fails.
+
+    Returns a state on it, shape (1, kept), and its multiplier per period. `flat` has the stage's keys in SI.
+    """
     settings = TrackingSettings.current()
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
     scales = shape.scales(values, 1)[0]

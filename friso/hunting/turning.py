@@ -74,9 +74,9 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks: of late and tall maxima within `SEPARATION` the tallest counts.
+    """Mark counted peaks: late and tall maxima, of which the tallest within `SEPARATION` counts.
 
-    MATLAB's findpeaks does so with MinPeakDistance.
+    Maxima are marked in `kinds`, which is used up. MATLAB's findpeaks does so with MinPeakDistance.
     """
     for k in range(count):
         if times[k] < COUNTED_AFTER or values[k] <= COUNTED_ABOVE:
@@ -119,7 +119,7 @@ def mean_period(times, count, kinds, ended):
 
 
 def span(times, values, count, since):
-    """Return the peak-to-peak range [m] of the turning points after a time."""
+    """Return the peak-to-peak range [m] of the turning points after the time `since` [s]."""
     low, high = np.inf, -np.inf
     for k in range(count):
         if times[k] >= since:
@@ -137,9 +137,10 @@ def last_turn(times, count, kinds):
 
 
 def run(times, values, counts, swing, ended, since, kinds, peaks, distinct, period, turned, earlier):
-    """Fill `peaks` and `distinct`, (runs, room), `period`, `turned` and `earlier`, (runs,).
+    """Scan turning points of runs for peaks, period, last turn and earlier swing.
 
-    See `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), holds marks in between.
+    The results fill `peaks` and `distinct`, (runs, room), and `period`, `turned` and `earlier`, (runs,). They and the
+    arguments are those of `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), holds marks in between.
     """
     for j in range(counts.size):
         count = counts[j]

@@ -118,6 +118,7 @@ class Judgement:
     - `observed`: the attractor was seen in long simulations only, not closed as an orbit.
     - `lasting` [m]: peak-to-peak swing of this motion if it is no known attractor but lasts to the end.
     - `runs_away`: the motion diverges from its reference.
+    - `running_away`: displacements after which the stage diverges (None: not looked for).
     - `given_up`: parts that would have taken more work than was allowed.
     """
 
@@ -156,7 +157,7 @@ def judge(
     work: float | None = None,
     tell: Callable[[Verdict], None] = lambda verdict: None,
 ) -> Judgement:
-    """Judge a stage whose motion was run and measured at a relative tolerance.
+    """Judge a stage whose motion was run and measured with the relative tolerance `rtol`.
 
     `begin` is called as each part begins (see `CheckPart`). `tell` is called with the verdict as soon as it is certain.
     Kicks and other bandwidths are searched afterwards; a cycle followed from another bandwidth may still contradict the
@@ -189,10 +190,7 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage without an attractor: whether it comes to rest, and where it would hunt.
-
-    Where it would hunt is searched along the bandwidth.
-    """
+    """Judge a stage without an attractor: whether it rests, and at which bandwidths it hunts."""
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -293,8 +291,8 @@ class OwnMotion:
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Run the stage's own motion, also with slightly different masses, and find how it ends.
 
-    `ends_in` decides. A motion that still swings, but less far or less often than the attractor, may be decaying. It is
-    continued if the given work suffices.
+    The motion hunts if it ends in a swing of the size and period of `target`. If it still swings, but less far or less
+    often, it may be decaying. It is continued if the given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()
@@ -330,9 +328,9 @@ def _widest(attraction: Hunting) -> float:
 def _starts(
     stage: Stage, attraction: Hunting, target: Target, work: float
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
-    """Find the kicks and moves that start hunting, within some work.
+    """Find the kicks and moves that start hunting, within an amount of work.
 
-    Returns both kicks and the moves, and the part that ran out of work, if any.
+    Returns the displacements, the pushes and the moves, and the part of the check that ran out of work, if any.
     """
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
@@ -354,7 +352,7 @@ def _starts(
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
-    """Return why a motion outside the known attractor may not come to rest; "" if it does.
+    """Return why a motion that ends in no attractor may not come to rest; "" if it does.
 
     `swing` [m] is its final peak-to-peak swing; `within` [s] is the time from which it stays near its reference (NaN:
     not within its run).
@@ -374,7 +372,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """Search the bandwidths within some work; return the result and the part given up."""
+    """Search other bandwidths for hunting; return the result and the part of the check given up."""
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)
@@ -383,9 +381,9 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
 
 
 def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
-    """Mark the ends of a search as no more certain than the verdict.
+    """Mark the ends found by a search through bandwidths as uncertain if the verdict is.
 
-    Ends are uncertain where the stage may diverge.
+    Ends are uncertain too where the stage may diverge.
     """
 
     def sure(end: AttractionEnd) -> bool:

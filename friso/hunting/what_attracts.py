@@ -45,8 +45,8 @@ def what_attracts(
     A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
     stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
     runs land where the map predicts. All other stages are searched from many starts, beside these cycles and motions,
-    and from `distances` [m], shape (count, n). Orbits are closed to a relative tolerance. Raises Exhausted if an
-    allowance of work is used up.
+    and from `distances` [m], shape (count, n). Orbits are closed to the relative tolerance `rtol`. Raises Exhausted if
+    an allowance of work is used up.
     """
     if not has_a_map(stages):
         return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
@@ -80,14 +80,17 @@ class _Cycles(ArrayRows):
 
     @classmethod
     def of(cls, stages: Ensemble, rtol: float) -> _Cycles:
-        """Close the cycles of stages to a relative tolerance, and find lasting motions beside them."""
+        """Close the cycles of stages, and find lasting motions beside the unstable ones.
+
+        Orbits are closed to the relative tolerance `rtol`.
+        """
         cycles = families(stages, rtol)
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:
-        """Add lasting motions beside the unstable orbits that a survey of maps closed.
+        """Add lasting motions beside the unstable orbits that a survey of return maps closed.
 
-        The numbers are those of the surveyed stages.
+        `numbers` are the numbers of these stages in the survey.
         """
         more = [np.full((len(numbers), 1), np.nan)]
         for motion in survey.repelling:
@@ -100,9 +103,9 @@ class _Cycles(ArrayRows):
 
     @property
     def attract_or_hold(self) -> np.ndarray:
-        """Return which stages have a stable cycle, or a motion beside an unstable one, (count,).
+        """Return which stages have a stable cycle, or a lasting motion beside an unstable one.
 
-        The motion beside it lasts.
+        The result has the shape (count,).
         """
         return np.any([family.attracting for family in self.families], axis=0) | np.isfinite(self.held).any(axis=1)
 
@@ -110,14 +113,14 @@ class _Cycles(ArrayRows):
 def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycles: _Cycles) -> Attractors:
     """Search the attractors of stages by simulation.
 
-    Runs start from many states, from distances [m], and beside cycles.
+    Runs start from many states, from `distances` [m], and beside cycles.
     """
     starts = cycles.held if distances is None else np.hstack([cycles.held, distances])
     return attractors(stages, False, rtol, starts, suggested=cycles.families)
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """Return the return map of one stage if its attractors are the given `motions`, else None."""
+    """Return the return map of one stage if its attractors are just `motions`, else None."""
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)
@@ -134,7 +137,7 @@ def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | 
 class Sketch:
     """Result of coarse return maps of stages, arrays of shape (count,).
 
-    `attracts` tells whether a stage seems to have an attractor, `decided` whether the map decides that.
+    `attracts` is true if a stage seems to have an attractor, and `decided` if the map decides that.
     """
 
     attracts: np.ndarray
@@ -155,7 +158,10 @@ def sketched(stages: Ensemble) -> Sketch:
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
-    """Return coarse maps of stages, None if they have none, and which are resolved, (count,)."""
+    """Return coarse return maps of stages, and which are resolved, shape (count,).
+
+    The maps are None if the stages have none.
+    """
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
     mapped = map_stages(stages, SKETCH_DISTANCES, 1, SKETCH_RTOL, sparse=True)
@@ -166,10 +172,10 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
 def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -> Attractors:
     """Find at least one apparent attractor of each stage that may hunt, if it has one.
 
-    This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A sketch of the maps
-    decides. If its attractor is weak, or landings wander, the cycles that Newton's method closes from the map at rest
-    decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if an
-    allowance of work is used up.
+    This is many times faster than `what_attracts`, and may miss an attractor with a narrow basin. A coarse return map
+    decides. If its attractor is weak, or sticking distances wander, the cycles that Newton's method closes from the map
+    at rest decide instead, unless `close` is off. Stages whose maps are not resolved are simulated. Raises Exhausted if
+    an allowance of work is used up.
     """
     mapped, decided = _sketch(stages)
     motions: list[Swinging] = []
@@ -191,8 +197,8 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 def _hardly_attracts(landing_map: LandingMap) -> bool:
     """Tell whether a coarse map has no attractor that can be trusted.
 
-    A trusted attractor is simple, strongly stable, and reached from enough points. Where the next landing is about as
-    far off as the last, straight pieces between points create long cycles that the stage does not have.
+    A trusted attractor is simple, strongly stable, and reached from enough points. Where a stage next sticks almost as
+    far off as before, straight pieces between points create long cycles that the stage does not have.
     """
     settings = ReturnMapSettings.current()
     swings = 1 if landing_map.symmetric else 2
@@ -238,9 +244,13 @@ def search_alone() -> Iterator[None]:
 def has_a_map(stages: Ensemble) -> bool:
     """Tell whether the sticking distance alone may decide how stages go on.
 
-    It does not if a joint swings freely while the cart sticks, a limiter chatters, a force limit without anti-windup
-    lets swings grow, integrals of several loops wind up separately, or the stage may stand anywhere within a dead band
-    or a backlash.
+    It does not in any of these cases:
+
+    - A joint swings freely while the cart sticks.
+    - A limiter chatters.
+    - A force limit without anti-windup lets swings grow.
+    - Integrals of several loops wind up separately.
+    - The stage may stand anywhere within a dead band or a backlash.
     """
     if _SEARCHES_ALONE.get():
         return False

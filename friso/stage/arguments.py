@@ -103,11 +103,11 @@ MOST_SEED = 2**31 - 1
 
 @dataclass(frozen=True)
 class ArgumentKind:
-    """Kind of an argument, chosen by its annotation.
+    """What an argument of a public function may be, chosen by its annotation.
 
-    It has a test, words for values that pass it, and an example. On the command line, `metavar` stands for the value
-    ("": the name of the parameter), and `command_type` is the type of one value (None: it has no form there); there
-    may be `several`.
+    `holds` tests a value, `words` describe values that pass, and `example` shows one. On the command line, `metavar`
+    stands for the value ("": the name of the parameter), and `command_type` is the type of one value (None: it cannot
+    be given there); there may be `several`.
     """
 
     holds: Callable[[Any], bool]
@@ -202,13 +202,13 @@ KINDS: dict[str, ArgumentKind] = {
     "MappingKeeper": _FUNCTION,
     "FileKeeper": _FUNCTION,
 }
-"""The kinds of arguments, by the annotations of public functions."""
+"""What arguments may be, by the annotations of public functions."""
 
 _PATH_KINDS = {"os.PathLike[str]", "Path", "Stage", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
 
 
 def alternatives(annotation: str) -> list[str]:
-    """Split an annotation at its outer bars.
+    """Split an annotation into its alternatives, at its outer bars.
 
     "int | None" has two parts, "Iterable[str | None]" has one.
     """
@@ -258,7 +258,7 @@ def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Argumen
 
 
 def near_words(word: str, words: Iterable[str]) -> str:
-    """Suggest the nearest of some words for an unknown one, or list them all."""
+    """Return a suggestion for an unknown word: the nearest of some `words`, or all of them."""
     from difflib import get_close_matches
 
     near = get_close_matches(word, words := [*words], 1)
@@ -266,16 +266,17 @@ def near_words(word: str, words: Iterable[str]) -> str:
 
 
 def _read_stage(source: Any) -> Stage:
-    """Return the stage of a file, or of tables."""
+    """Return the stage of a file, or of tables in a mapping."""
     from friso.stage.files import load
 
     return Stage(**source) if isinstance(source, Mapping) else load(source)
 
 
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
-    """Raise InputError for an argument that fits none of its kinds, or for an unusable path.
+    """Raise InputError for an argument of a wrong type, or for an unusable path.
 
-    With `sets`, the function has an option to set keys, and the error suggests it for a dictionary.
+    `kinds` say what it may be. With `sets`, the function has an option to set keys, and the error suggests it for a
+    dictionary.
     """
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))

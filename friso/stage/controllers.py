@@ -22,7 +22,7 @@ KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
 """Stage-file keys that every controller has."""
 
 OF_ANY_FORM = ("kind", "force_limit", "anti_windup", "anti_windup_time", "filters")
-"""Keys of a controller that are unchanged when it is put into another form."""
+"""Keys of a controller that stay if it is given in another way, by gains instead of rules."""
 
 AntiWindup = Literal["none", "clamp", "back_calculation"]
 """What integrators do while the force is at its limit: they continue to wind up; stop where they would drive the force
@@ -50,8 +50,8 @@ class ControllerSection(AgainstFriction):
     """Base of the controllers.
 
     Each declares its keys, `kind: Literal["name"]`, its blocks, and everything else that friso asks of a controller; no
-    other module reads its keys. A kind may have several forms, which are distinguished by their keys and derive from
-    the class that declares the kind.
+    other module reads its keys. A kind may be given in several ways ("forms"), such as by rules or by gains. These are
+    told apart by their keys, and derive from the class that declares the kind.
     """
 
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
@@ -103,17 +103,27 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def pick(cls, forms: "Sequence[type[ControllerSection]]", table: Mapping[str, Any]) -> "type[ControllerSection]":
-        """Return the form of a [controller] table of this kind. Raises StageError."""
+        """Choose the class that reads a [controller] table, among the `forms` of this kind.
+
+        A form is one way to give a controller, such as by rules or by gains. The first is the default. Raises
+        StageError if none fits, or more than one.
+        """
         return forms[0]
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return values for keys that follow other keys of the stage if its file lacks them."""
+        """Return values for keys that the stage file may lack, because they follow from others.
+
+        `flat` has the stage's keys in SI.
+        """
         return {}
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Hashable:
-        """Return further choices on which the equations depend, such as absent terms."""
+        """Return further choices on which the equations depend, such as terms that are absent.
+
+        They follow from the stage's keys, `flat`.
+        """
         return None
 
     @classmethod
@@ -146,8 +156,8 @@ class ControllerSection(AgainstFriction):
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
         """Return other structures of the controller for `friso tune` to try, by their names.
 
-        Each has the keys of the stage file that change: numbers [SI] as floats, texts, or None for keys to remove. A
-        controller may declare none.
+        Each has the keys of the stage file that change: numbers [SI] as floats, texts, or None for keys to remove.
+        There may be none.
         """
         return {}
 
@@ -155,7 +165,7 @@ class ControllerSection(AgainstFriction):
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """Return the numbers to enter into a drive.
 
-        They are the keys that are not 0, then those common to every controller.
+        They are the keys that are not 0: the controller's own, then those of every controller.
         """
         fields = numeric_fields(cls)
         names = sorted(fields, key=lambda name: name in ControllerSection.model_fields)
@@ -167,12 +177,12 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def _called(cls, name: str) -> tuple[str, str]:
-        """Return the name of a key in a table of gains, and its symbol."""
+        """Return the words for a key in a table of gains, and its symbol."""
         return {**SYMBOLS, **cls.symbols}.get(name, (name.replace("_", " "), name))
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the path from the error to the demanded force in text characters.
+        """Draw the path from the error to the demanded force on a `canvas` of text characters.
 
         By default it is a box (`friso.drives.diagram.Canvas`).
         """
@@ -180,17 +190,20 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def note(cls, flat: Mapping[str, Any]) -> str:
-        """Return the assumptions of a verdict on a stage with this controller, in a sentence."""
+        """Say what a verdict on a stage with this controller assumes, in a sentence; "" for nothing."""
         return ""
 
     @classmethod
     def key(cls, name: str) -> str:
-        """Return the stage-file key of a name in the table."""
+        """Return the stage-file key of a name in the table [controller], such as "controller.kp"."""
         return f"{CONTROLLER}.{name}"
 
 
 class Controllers(Variants):
-    """Registry of controllers by kind; forms of one kind are distinguished by their keys."""
+    """Registry of controllers by kind.
+
+    A kind may be given in several ways ("forms"), such as by rules or by gains, which their keys tell apart.
+    """
 
     def __init__(self) -> None:
         super().__init__("kind", "friso.controllers")
@@ -198,12 +211,12 @@ class Controllers(Variants):
 
     @property
     def forms(self) -> dict[str, list[type[ControllerSection]]]:
-        """Return the forms of each kind."""
+        """Return the classes of each kind of controller, one for each way to give it."""
         load_own(self.group)
         return self._forms
 
     def register(self, cls: SectionClass) -> SectionClass:
-        """Add a form of a controller (a class decorator).
+        """Add the class of a controller, as a class decorator.
 
         Raises InputError for a kind that another class declares.
         """
@@ -214,31 +227,34 @@ class Controllers(Variants):
         return cls
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """Return the class for a [controller] table.
+        """Return the class that reads a [controller] table.
 
-        Raises InputError for an unknown kind, StageError for an unclear form.
+        Raises InputError for an unknown kind, StageError for keys of none or of several of its classes.
         """
         owner = cast(type[ControllerSection], super().pick(table))
         return owner.pick(self.forms[table[self.tag]], table)
 
     def of(self, flat: Mapping[str, Any]) -> type[ControllerSection]:
-        """Return the class of the controller of a stage given as flat keys."""
+        """Return the class of a stage's controller; `flat` has the stage's keys."""
         forms = self._forms_of(flat[KIND])
         recognised = (form for form in forms if any(form.key(name) in flat for name in form.recognised_by))
         return next(recognised, None) or next(form for form in forms if not form.recognised_by)
 
     @property
     def words(self) -> dict[str, str]:
-        """Return the names of keys on the axes of maps."""
+        """Return the words for keys of controllers on the axes of maps."""
         forms_of_all = (form for forms in self.forms.values() for form in forms)
         return {form.key(name): word for form in forms_of_all for name, word in form.words.items()}
 
     def form(self, kind: str, name: str) -> type[ControllerSection]:
-        """Return the form of a kind whose class has this name."""
+        """Return the class with this name among those of a kind of controller."""
         return next(form for form in self._forms_of(kind) if form.__name__ == name)
 
     def _forms_of(self, kind: str) -> list[type[ControllerSection]]:
-        """Return the forms of a kind, which an installed package may declare."""
+        """Return the classes of a kind of controller, which an installed package may have added.
+
+        There is one for each way to give it, such as by rules or by gains.
+        """
         self.named(kind)
         return self.forms[kind]
 
@@ -248,14 +264,14 @@ register_controller = CONTROLLERS.register
 
 
 def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
-    """Return the class of the controller of a stage given as flat keys."""
+    """Return the class of a stage's controller; `flat` has the stage's keys."""
     return CONTROLLERS.of(flat)
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the controller's keys that depend on other keys, at their present values.
+    """Return the controller's keys that follow from other keys, at their present values [SI].
 
-    They then stay as tuned for the machine of the stage file, if the machine changes.
+    If these are set, the controller stays tuned for the machine of the stage file while the machine changes.
     """
     controller = controller_of(flat)
     of_file = {*map(controller.key, numeric_fields(controller))}

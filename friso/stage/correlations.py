@@ -1,4 +1,4 @@
-"""Read and write correlations of a stage's uncertain keys, and draw stages from them.
+"""Read and write correlations of a stage's uncertain keys, and sample stages from them.
 
 `identified.correlations.toml` stands beside `identified.toml` and holds `keys` and their correlation `matrix`: that of
 the normal distributions behind the keys (a normal copula, Nelsen 2006, An Introduction to Copulas, Sec. 2.8). For two
@@ -32,7 +32,7 @@ ROUNDING = 1e-9
 eigenvalues."""
 
 MOST = 100
-"""Largest number of draws per stage before the ranges are reported to allow hardly any."""
+"""Largest number of samples tried per stage before the ranges count as hardly ever allowed."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Correlations:
     def over(self, keys: list[str]) -> np.ndarray:
         """Return the correlation matrix of all `keys`, shape (keys, keys).
 
-        Keys that are not named here are independent.
+        Keys without a correlation here are independent.
         """
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]
@@ -131,7 +131,7 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
-    """Raise StageError for a key that the stage lacks, or that is not uncertain."""
+    """Check that all keys are uncertain keys of the stage. Raises StageError otherwise."""
     keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:
@@ -145,9 +145,9 @@ def _belongs(correlations: Correlations, stage: Stage) -> None:
 
 @dataclass(frozen=True)
 class Sample:
-    """Stages drawn at random: dotted keys to SI arrays, shape (count,).
+    """Stages sampled at random: keys to their SI values, arrays of shape (count,).
 
-    Invalid draws were replaced. `beyond` counts draws in which a key exceeded its bound. `broken` counts draws that
+    Invalid samples were replaced. `beyond` counts those in which a key exceeded its bound. `broken` counts those that
     broke a rule between keys, by the rule.
     """
 
@@ -158,15 +158,15 @@ class Sample:
 
     @property
     def left_out(self) -> int:
-        """Return the number of draws that were replaced."""
+        """Return the number of samples that were replaced."""
         return self.beyond + sum(self.broken.values())
 
 
 def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sample:
-    """Draw stages from a stage with uncertain keys; the same seed gives the same stages.
+    """Sample stages from a stage with uncertain keys; the same seed gives the same stages.
 
-    They follow a scrambled Sobol sequence (Owen 1998). Raises StageError if no key is uncertain, or hardly any draw is
-    allowed.
+    They follow a scrambled Sobol sequence (Owen 1998). Raises StageError if no key is uncertain, or if hardly any
+    sample is a valid stage.
     """
     from scipy.stats import qmc
 
@@ -196,9 +196,9 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
 
 
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the uncertain keys at quantiles, given as independent uniform numbers.
+    """Return values of the uncertain keys [SI], each of shape (count,), at given quantiles.
 
-    Both have the shape (count, keys).
+    `shares` are independent uniform numbers, shape (count, keys), which `matrix` correlates.
     """
     from scipy.special import ndtr, ndtri
 
@@ -216,9 +216,9 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which draws are valid stages, and which rule between keys the others break.
+    """Return which samples are valid stages, and which rule between keys the others break.
 
-    Both have the shape (count,); the rule is "" for none.
+    Both have the shape (count,); the rule is "" if a key exceeds its bound, or for none. `keys` has the values [SI].
     """
     fields = stage.numeric_keys()
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
@@ -231,9 +231,9 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 
 
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return the flat keys of drawn stages.
+    """Return the keys of sampled stages in SI: those of the stage, with sampled `keys` in place.
 
-    The controller stays tuned for the original stage: it does not know the drawn mass.
+    The controller stays tuned for the original stage: it does not know the sampled mass.
     """
     flat = stage.flat()
     return stage.flat(as_tuned(flat) | dict(keys))

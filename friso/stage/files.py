@@ -53,14 +53,14 @@ def load(path: str | os.PathLike[str]) -> Stage:
 
 
 def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the tables of a stage file, which need not make a whole stage. Raises StageError."""
+    """Read the tables of a stage file, which need not make a whole stage. Raises StageError."""
     return _hinted(path, lambda text: _with_whole_paths(parsed(text, _EXPECTED), Path(path).parent))
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """Read a stage file; for another kind of file, the error names the command that reads it.
+    """Read a stage file by the function `read`.
 
-    Raises StageError.
+    For another kind of file, the error names the command that reads it. Raises StageError.
     """
     try:
         return read(text_of(Path(path), _EXPECTED))
@@ -99,9 +99,9 @@ def loads(text: str, origin: str = "stage file") -> Stage:
 
 
 def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
-    """Return the stage of a TOML text; its files stand beside it in a folder.
+    """Return the stage of a TOML text; files that it names stand in `folder`.
 
-    Raises StageError.
+    `origin` names the text in errors. Raises StageError.
     """
     try:
         tables = parsed(text, _EXPECTED)
@@ -122,7 +122,7 @@ def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[st
 
 
 def _refuse_specification(tables: Mapping[str, Any]) -> None:
-    """Raise StageError for tables that describe a design instead of a stage."""
+    """Raise StageError if tables describe a design instead of a stage."""
     if len({"machine", "moves", "leaves", "position", "safety"} & tables.keys()) > 1:
         raise StageError("", "a specification of a design", _EXPECTED, "friso design STAGE.toml SPECIFICATION.toml")
 
@@ -175,7 +175,7 @@ def parse_set(text: str) -> tuple[str, Any]:
 def _value(text: str) -> Any:
     """Return a TOML value, or the text itself if it is no TOML value.
 
-    An inline table holds neither comments nor a second line.
+    A text with a comment or a second line is no value, because it is read as part of an inline table.
     """
     if _MANY_PARTS.search(text):
         return text
@@ -188,7 +188,7 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
-    """Read a text file that should be `expected`.
+    """Read a text file; `expected` says in errors what it should be.
 
     With `latin` it may be Latin-1, as older programs write it. Raises InputError, also for a device, a pipe, or more
     than MOST_BYTES.
@@ -272,7 +272,7 @@ _WIDTH = 100
 
 
 def _syntax_error(text: str, message: str) -> str:
-    """Explain a syntax error of a TOML text, with its line and a caret below the place."""
+    """Explain a syntax error of a TOML text, with its line and a caret below the column."""
     place = _PLACE.search(message)
     if place is None:
         return message
@@ -294,7 +294,7 @@ _INDENT = " " * 12
 
 
 def _open_quote(line: str) -> int | None:
-    """Return the position of a quote that is not closed in a line; None if there is none."""
+    """Return the index of a quote that is not closed in a line; None if there is none."""
     opened, escaped = None, False
     for place, sign in enumerate(line):
         if escaped:

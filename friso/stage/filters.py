@@ -50,13 +50,13 @@ class FilterSection(UncertainSection):
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
         """Return further choices on which the equations of a filter depend, such as its order.
 
-        `row` holds the filter's keys.
+        `row` holds the filter's keys with SI values.
         """
         return None
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: Any) -> Transfer:
-        """Return the transfer function from its keys, numbers or symbols."""
+        """Return the transfer function from the filter's keys in `row`, numbers or symbols."""
         raise NotImplementedError
 
 
@@ -108,7 +108,7 @@ class LowPassFilter(ContinuousFilter):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> int:
-        """Return the order."""
+        """Return the order of the low-pass, 1 or 2."""
         return int(row["order"])
 
     @classmethod
@@ -199,7 +199,7 @@ class SampledBiquadFilter(FilterSection):
 
 
 def _omega(frequency: Any) -> Any:
-    """Return the angular frequency [rad/s] of a frequency [Hz], exact for a symbol."""
+    """Return the angular frequency [rad/s] of a frequency [Hz], which may be a symbol."""
     if isinstance(frequency, float):
         return 2 * pi * frequency
     from sympy import pi as exact
@@ -212,7 +212,7 @@ def _second_order(omega: Any, damping: Any) -> Polynomial:
 
 
 class FilterForm(NamedTuple):
-    """A filter's form: its kind, its path, the choices of its equations, and its discretisation."""
+    """Structure of a filter: kind, path, the choices of its equations, and discretisation."""
 
     kind: str
     path: str
@@ -226,9 +226,9 @@ class FilterForm(NamedTuple):
 
 
 def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
-    """Return the form of each filter in an array of filters, given the stage's flat keys.
+    """Return the structure of each filter in an array of filters.
 
-    `key` names the array: "controller.filters".
+    `flat` has the stage's keys, and `key` names the array: "controller.filters".
     """
     forms = []
     for place in row_keys(flat, key):

@@ -14,10 +14,10 @@ from friso.stage.plug_ins import load_own
 from friso.stage.section import Rule, UncertainSection, nearest_name
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
-"""Function that computes keys that follow from others, from the flat SI mapping; arrays are allowed."""
+"""Function of a stage's keys in SI that computes further keys; values may be arrays."""
 
 DERIVATIONS: dict[str, Derivation] = {}
-"""Derivations by table: each computes the keys that follow from a table."""
+"""Functions that compute the keys that follow from a table, by the table's name."""
 
 
 def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
@@ -31,7 +31,7 @@ def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
 
 
 def derived(flat: dict[str, Any]) -> dict[str, Any]:
-    """Return the flat keys with all keys that follow from their tables."""
+    """Add to a stage's keys in SI all keys that follow from its tables, such as [flexure]."""
     load_own("friso.derivations")
     tables = {key.split(".")[0] for key in flat}
     for table, derivation in DERIVATIONS.items():
@@ -146,7 +146,7 @@ Flexure = create_model(
 
 
 def unknown_material(name: str) -> StageError:
-    """Return the error for a material that is not known, naming the nearest that is."""
+    """Make the error for a material that friso does not have, with the nearest that it has."""
     near = nearest_name(name, materials()) or next(
         (material for material in materials() if name.lower() in material), None
     )
@@ -156,7 +156,7 @@ def unknown_material(name: str) -> StageError:
 
 
 def with_material(flat: dict[str, Any]) -> dict[str, Any]:
-    """Return the flat keys of leaves with the numbers of their material."""
+    """Return a stage's keys with the numbers of its leaf springs' material, in SI."""
     name = flat.get("flexure.material")
     if not name:
         return flat

@@ -53,13 +53,13 @@ class Several:
     alone: bool = False
 
     def on(self, kind: AxisKind) -> Self:
-        """Return the values that the key accepts on an axis of that kind."""
+        """Return this declaration for an axis of another kind, with its units."""
         examples = tuple(replace(self.of, example=text).on(kind).example for text in self.examples)
         return replace(self, of=self.of.on(kind), examples=examples)
 
     @property
     def expected(self) -> str:
-        """Return the values that the key accepts, in words."""
+        """Say in words what values the key accepts."""
         if self.alone:
             return f"one value or an array of up to {self.most}, each {self.of.expected}"
         count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
@@ -67,12 +67,12 @@ class Several:
 
     @property
     def written_example(self) -> str:
-        """Return the example as it stands in a file."""
+        """Return an example of the array as it stands in a file."""
         quote = '"' if isinstance(self.of, Quantity) else ""
         return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
 
     def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
-        """Return the values of an array, each read by `read_one` or by the key's own kind.
+        """Return the values of an array, each read by `read_one`, or else as one value of the key.
 
         Raises InputError, under the number of the wrong element.
         """
@@ -109,12 +109,12 @@ class Coefficients:
 
     @property
     def expected(self) -> str:
-        """Return the values that the key accepts, in words."""
+        """Say in words what values the key accepts."""
         return f"an array of numbers{', complex ones as texts' if self.roots else ''}"
 
     @property
     def written_example(self) -> str:
-        """Return the example as it stands in a file."""
+        """Return an example of the array as it stands in a file."""
         return f"[{', '.join(as_toml(example) for example in self.examples)}]"
 
     def read(self, raw: Any) -> Values:
@@ -136,14 +136,17 @@ class Coefficients:
 
 
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """Return the flat keys of an array's elements, in order; none if the stage lacks it."""
+    """Return the keys of an array's elements in a stage, such as "friction.element_stiffness.2".
+
+    They are in order; there are none if the stage lacks the array.
+    """
     return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]
 
 
 def row_keys(flat: Mapping[str, Any], key: str) -> list[str]:
-    """Return the prefixes of the flat keys of an array's tables, in order.
+    """Return the names of an array's tables in a stage, such as "controller.filters.2".
 
-    There are none if the stage does not have the array.
+    They are in order; there are none if the stage lacks the array.
     """
     places = (f"{key}.{number}" for number in count(1))
     return [*takewhile(lambda place: any(name.startswith(f"{place}.") for name in flat), places)]

@@ -12,11 +12,11 @@ from friso.quantities import Quantity, positive
 from friso.stage.section import UncertainSection, Variants
 
 KIND, DURATION = "motion.kind", "motion.duration"
-"""Flat keys of every motion."""
+"""Keys that every motion has."""
 
 
 class ReferenceForm(NamedTuple):
-    """The form of a reference: pieces of polynomials of a `degree`, 2 to 4, and sinusoids.
+    """What a reference consists of: polynomials of a `degree`, 2 to 4, and sinusoids.
 
     `tones` is the number of sinusoids.
     """
@@ -34,13 +34,13 @@ class ReferenceForm(NamedTuple):
 
 
 QUADRATIC = ReferenceForm()
-"""Form of a reference of parabolic pieces. It fits any motion with bounded acceleration, and a reference at rest."""
+"""Reference of parabolic pieces. It fits any motion with bounded acceleration, and rest."""
 
 
 class Tone(NamedTuple):
-    """A sinusoid: amplitude [m], phase [turns], frequency [Hz], and its rise [Hz/s].
+    """A sinusoid of the reference: amplitude [m], phase [turns], frequency [Hz], rise [Hz/s].
 
-    The phase is the initial one.
+    The rise is that of the frequency; phase and frequency are those at the start.
     """
 
     amplitude: Any
@@ -80,7 +80,7 @@ the reference has them."""
 class Motion(UncertainSection):
     """Base of the motions: each kind declares its keys and its reference.
 
-    A reference consists of polynomial pieces, sinusoids, or both. The functions take the stage as flat keys to SI
+    A reference consists of polynomial pieces, sinusoids ("tones"), or both. The functions take the stage's keys with SI
     numbers, or arrays with one entry per run.
     """
 
@@ -92,7 +92,7 @@ class Motion(UncertainSection):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return the degree of the polynomials and the number of tones."""
+        """Say what the reference consists of: polynomials of a degree, and sinusoids."""
         return QUADRATIC
 
     @staticmethod
@@ -130,17 +130,17 @@ class Motion(UncertainSection):
 
     @staticmethod
     def lowered(flat: Mapping[str, Any]) -> Sequence[Lowered]:
-        """Return the limits that moves of a single stage are too short to reach."""
+        """Return the limits that moves of a stage are too short to reach."""
         return ()
 
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the defaults of keys that follow from other keys."""
+        """Return values for keys that the stage file may lack, because they follow from others."""
         return {}
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the keys that change when a move becomes longer by a factor.
+        """Return the keys that change when a move becomes longer by a factor, with new values [SI].
 
         There are none without a move.
         """
@@ -148,9 +148,9 @@ class Motion(UncertainSection):
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of two keys for moves around the present one; none if there is no move.
+        """Return ranges [SI] of two keys for moves around the present one; none if it is no move.
 
-        `shares` gives the two ends of both ranges, as factors on the present values.
+        `shares` are the ends of both ranges, as multiples of the present values.
         """
         return {}
 
@@ -160,5 +160,5 @@ register_motion = MOTION.register
 
 
 def motion_of(flat: Mapping[str, Any]) -> type[Motion]:
-    """Return the class of the motion of a stage given as flat keys."""
+    """Return the class of a stage's motion; `flat` has the stage's keys."""
     return cast(type[Motion], MOTION.named(flat[KIND]))

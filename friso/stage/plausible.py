@@ -114,7 +114,7 @@ def implausible_values(stage: Stage) -> Iterator[str]:
 
 
 def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
-    """Yield the units in which a mass may have been meant, with the factors of change."""
+    """Yield the units in which a mass may have been meant, with factors that convert its value."""
     written = _written(stage, key)
     unit = written.partition(" ")[2].strip()
     if stage.axis_kind == ROTARY or unit not in _MASS.units:
@@ -124,7 +124,7 @@ def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
 
 
 def _complaints(stage: Stage, flat: Mapping[str, Any]) -> dict[str, str]:
-    """Return a sentence on each implausible value of a stage, given as flat keys, by key."""
+    """Return a sentence on each implausible value of a stage, by key; `flat` has its keys in SI."""
     return dict(_judged(stage, flat))
 
 
@@ -153,7 +153,7 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """Return usual ranges by key.
+    """Return usual ranges of values by key, for a stage with the keys `flat` in SI.
 
     Friction scales with the weight, and stiffness before sliding with friction.
     """
@@ -174,7 +174,7 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
 
 
 def _presliding(force: float) -> _Usual:
-    """Return the usual range of a contact's stiffness before sliding, for a friction force."""
+    """Return the usual range of a contact's stiffness before sliding, for a friction force [N]."""
     low, high = (force / way for way in reversed(PRESLIDING))
     return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 
@@ -190,9 +190,9 @@ def _written(stage: Stage, key: str) -> str:
 
 
 def _question(written: str, usual: _Usual) -> str:
-    """Return a question that names the unit that was probably meant.
+    """Ask whether another unit was meant, with which the number as written would be usual.
 
-    With that unit, the number as written is usual.
+    The result is "" if there is no such unit.
     """
     number, _, unit = written.partition(" ")
     for other in usual.units:

@@ -27,7 +27,7 @@ SCRIPT = "__main__"
 
 @dataclass(frozen=True)
 class PlugIn:
-    """A module outside friso: its name, and the file that it was loaded from ("" for none)."""
+    """A module from outside friso: its name, and the file it was loaded from ("" for none)."""
 
     module: str
     file: str
@@ -79,12 +79,14 @@ FRISO = {
     "friso.motions": ("friso.equations.motions", "friso.identification.recorded_motion"),
     "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
 }
-"""Modules that register friso's own sections, by group. They belong to higher layers, and are imported when a stage is
-first read."""
+"""Modules that register friso's own sections of the stage file, by group.
+
+They belong to higher layers, and are imported when a stage is first read.
+"""
 
 
 def load_own(group: str) -> None:
-    """Import friso's own modules of a group."""
+    """Import friso's own modules of a group, such as "friso.controllers"."""
     for module in FRISO.get(group, ()):
         if module not in sys.modules:
             importlib.import_module(module)

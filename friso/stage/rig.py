@@ -45,7 +45,7 @@ def is_as_built(stage: Any) -> bool:
 
 
 def left_out(stage: Any, tables: Sequence[str] = AS_BUILT) -> str:
-    """Say which of the `tables` an ideal-machine analysis leaves out; "" if none."""
+    """Say which `tables` of a stage an analysis of the ideal machine leaves out; "" if none."""
     placed = stage.conditions is not None and stage.conditions.place is not None
     left = [name for name in tables if getattr(stage, name) and not (name == "rail" and placed)]
     if not left:
@@ -64,7 +64,10 @@ LOOPS = ("velocity", "position")
 
 
 def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
-    """Return the rule that one sample time is a whole multiple of another."""
+    """Make the rule that the sample time `slow` is a whole multiple of the sample time `fast`.
+
+    Both are keys; `longer` and `shorter` are example values.
+    """
     optional = "velocity" in fast
 
     def holds(flat: Mapping[str, Any]) -> Any:
@@ -80,7 +83,10 @@ def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
 
 
 def _one_travel(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the travel per turn is stated once, or twice with equal values."""
+    """Tell whether the travel per turn is stated once, or twice with equal values.
+
+    The result is an array if keys are arrays.
+    """
     of_drive, lead, ratio = (
         flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio")
     )
@@ -183,7 +189,7 @@ _HARMONICS = ("rail.first_harmonic", "rail.second_harmonic", "rail.third_harmoni
 
 
 def _total(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
-    """Return the sum of some keys."""
+    """Return the sum of the values of some keys."""
     return sum(flat[key] for key in keys)
 
 

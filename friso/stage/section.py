@@ -28,9 +28,10 @@ from friso.stage.plug_ins import load_installed, load_own, plug_in_of
 
 @dataclass(frozen=True)
 class Rule:
-    """A condition between keys; `holds` gets the flat SI mapping of `Stage.flat`.
+    """A condition between keys of a stage file.
 
-    The values may be arrays.
+    `holds` gets the stage's keys with SI values, which may be arrays, and tests it. `expected` says in words what must
+    hold, and `example` shows it.
     """
 
     keys: tuple[str, ...]
@@ -45,7 +46,7 @@ class Rule:
 
 
 def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
-    """Return the flat keys below a table, without the name of the table."""
+    """Return the keys below a table or a row of an array, without its name."""
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
@@ -122,8 +123,8 @@ class UncertainSection(Section):
     def numbers(self) -> dict[str, Any]:
         """Return the values by key.
 
-        Values of an array stand under key and number, counted from 1. Values of tables in an array stand under their
-        own keys, after that number.
+        A value in an array stands under key and number, counted from 1. Keys of a table in an array stand under that
+        array's key and the table's number.
         """
         values: dict[str, Any] = {}
         for key, value in self:
@@ -146,7 +147,7 @@ class UncertainSection(Section):
 
 
 def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
-    """Return an array element's value, uncertain if its text has a range. Raises InputError."""
+    """Read an element of an array, which may be uncertain, "20 N +/- 1 N". Raises InputError."""
     text = getattr(value, "text", value)
     return uncertain_value(text, field) if is_range(text) else field.read(value)
 
@@ -156,13 +157,13 @@ SectionClass = TypeVar("SectionClass", bound=type[Section])
 
 @dataclass(frozen=True)
 class Table:
-    """A key that takes a table: `pick` chooses the section class, `example` shows a table."""
+    """A key that takes a table: `pick` chooses the class that reads it, `example` shows one."""
 
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
 
     def read(self, entry: Any, info: ValidationInfo) -> Any:
-        """Return the section for a table; a section is left as it is. Raises InputError."""
+        """Make the section from a table; a section is left as it is. Raises InputError."""
         if isinstance(entry, Section):
             return entry
         if not isinstance(entry, dict):
@@ -174,7 +175,7 @@ class Table:
 
 
 class Variants:
-    """Sections distinguished by one key, the tag: `kind` of [motion], `model` of [friction].
+    """Sections told apart by one key, the tag: `kind` of [motion], `model` of [friction].
 
     Installed packages may add more through entry points of a `group`, which are imported when an unknown name is met.
     """
@@ -185,7 +186,7 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """Return the variants by name.
+        """Return the classes of the sections by name.
 
         friso's own come first, alphabetically, whichever module was imported first.
         """
@@ -193,11 +194,11 @@ class Variants:
         return self._classes
 
     def name_of(self, cls: type[Section]) -> str:
-        """Return the name that a variant declares as `kind: Literal["step"]`."""
+        """Return the name that a class declares, "step" for `kind: Literal["step"]`."""
         return get_args(cls.model_fields[self.tag].annotation)[0]
 
     def register(self, cls: SectionClass) -> SectionClass:
-        """Class decorator: add a variant. Raises InputError where its name is taken."""
+        """Add a class, as a class decorator. Raises InputError where its name is taken."""
         name = self.name_of(cls)
         if plug_in_of(cls):
             load_own(self.group)  # friso's own names come first
@@ -216,13 +217,13 @@ class Variants:
         return cls
 
     def named(self, name: Any) -> type[Section] | None:
-        """Return the class of a variant; None for a name that nobody declares."""
+        """Return the class with this name; None for a name that nobody declares."""
         if name not in self.classes and self.group:
             load_installed(self.group)
         return self.classes.get(name)
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """Return the class for a table. Raises InputError when the tag is missing or unknown."""
+        """Return the class that reads a table. Raises InputError when the tag is missing or unknown."""
         name = table.get(self.tag)
         if isinstance(name, str) and (cls := self.named(name)):
             return cls
@@ -233,20 +234,20 @@ class Variants:
 
 @dataclass(frozen=True)
 class OneTable:
-    """A table of a single class, used like `Variants`."""
+    """The single class that reads a table, used in place of `Variants`."""
 
     section: type[Section]
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """Return the class for a table."""
+        """Return the class that reads a table."""
         return self.section
 
 
 @dataclass(frozen=True)
 class TableArray:
-    """A key that takes an array of tables.
+    """A key that takes an array of at most `most` tables.
 
-    There are at most `most` tables, of the `variants`; `example` shows one.
+    `variants` choose the class that reads each table; `example` shows one.
     """
 
     variants: Variants | OneTable
@@ -254,7 +255,7 @@ class TableArray:
     most: int
 
     def read(self, entries: Any, info: ValidationInfo) -> Rows:
-        """Return the sections for an array of tables.
+        """Make the sections from an array of tables.
 
         Raises InputError, under the number of the wrong one.
         """
@@ -271,7 +272,10 @@ class TableArray:
         return Rows(rows)
 
     def rows(self, flat: Mapping[str, Any], key: str) -> dict[str, type[Section]]:
-        """Return the places of an array's tables in a stage given as flat keys, and their classes."""
+        """Return the classes of the tables in a stage's array, by names like "controller.filters.2".
+
+        `flat` has the stage's keys, and `key` names the array.
+        """
         return {place: self.variants.pick(keys_below(flat, place)) for place in row_keys(flat, key)}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -305,14 +309,14 @@ def nearest_name(name: Any, names: Iterable[str]) -> str | None:
 
 
 def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
-    """Return the error for a key that does not exist, naming the nearest existing key."""
+    """Make the error for a key that does not exist, with the nearest of the existing `names`."""
     near = nearest_name(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
     return InputError(key, hint, f"one of {', '.join(names)}", example)
 
 
 def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> InputError:
-    """Return one InputError from pydantic's list of problems.
+    """Make one InputError from pydantic's list of problems.
 
     An unknown key comes first, since it often explains a missing one; other problems follow below it.
     """
@@ -331,7 +335,7 @@ def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> Inp
 
 
 def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
-    """Return the error for one entry of pydantic's list."""
+    """Make the error for one entry of pydantic's list of problems."""
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -351,7 +355,7 @@ def _own_first(cls: type[Section]) -> list[str]:
 
 
 def _complete(error: InputError, key: str) -> InputError:
-    """Return an error completed with the key of the table in which it occurred.
+    """Put the key of the table before the key of an error that occurred in it.
 
     `key` is also put before an example that is a mere value.
     """
@@ -361,7 +365,7 @@ def _complete(error: InputError, key: str) -> InputError:
 
 
 def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
-    """Return what a key takes, and an example."""
+    """Say in words what a key takes, and give an example."""
     field = cls.model_fields[key]
     for item in field.metadata:
         if isinstance(item, Table):

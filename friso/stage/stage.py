@@ -1,4 +1,4 @@
-"""Define the stage: all tables together, and the flat SI mapping that the equations read."""
+"""Define the stage: all tables together, and the keys with SI values that equations read."""
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -242,13 +242,13 @@ class Stage(Section):
         return {key: item.as_written() if isinstance(item, Section) else item for key, item in texts.items()}
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return dotted keys to SI floats, texts and booleans, with defaults filled in.
+        """Return all keys of the stage, such as "friction.static", with their values in SI.
 
-        Absent optional keys are absent, and so are the arrays of [floor]. Elements of any other array are numbered
-        from 1: friction.element_stiffness.2.
+        Values are floats, texts and booleans; defaults are filled in. Absent optional keys are absent, and so are the
+        arrays of [floor]. Elements of any other array are numbered from 1: friction.element_stiffness.2.
 
-        `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow other keys
-        are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
+        `swept`, keys to SI numbers or arrays, is laid over the stage before the defaults that follow other keys are
+        filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
         """
         if not swept:
             return dict(self._complete)
@@ -263,7 +263,7 @@ class Stage(Section):
 
     @cached_property
     def _declared(self) -> dict[str, Any]:
-        """Return the flat keys that the stage file gives."""
+        """Return the keys that the stage file gives, with SI values."""
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
             if isinstance(section, UncertainSection):
@@ -281,7 +281,7 @@ class Stage(Section):
 
     @cached_property
     def _sweepable(self) -> Mapping[str, Quantity | Number]:
-        """Return the numeric keys that may be swept.
+        """Return unit, bound and example of the numeric keys that may be swept.
 
         Keys that follow from leaf springs are excluded.
         """
@@ -309,7 +309,7 @@ class Stage(Section):
         return changed(self.as_written(), changes)
 
     def in_own_units(self, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return changes that were typed beside a stage file, completed by the units of the file.
+        """Complete changes that a user typed beside a stage file by the units of the file.
 
         A bare number gets the unit that the file has for its key; wrong capitals in a unit are corrected.
         """
@@ -320,7 +320,7 @@ class Stage(Section):
         }
 
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
-        """Return the stage with SI numbers for dotted keys, and without some tables.
+        """Return the stage with some keys set to SI numbers, and `without` some tables.
 
         Numbers are written so that they read back unchanged. Raises StageError.
         """
@@ -351,9 +351,9 @@ class Stage(Section):
 
 
 def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """Return a new stage from tables in which dotted keys are set, or removed by None.
+    """Return a new stage from tables in which some keys are set, or removed by None.
 
-    A controller that is set in another form, by its gains where the tables have a crossover, replaces the controller
+    A controller that is given in another way, by its gains where the tables have a crossover, replaces the controller
     of the tables. The tables passed in stay as they are. Raises StageError.
     """
     own, tables = {*tables}, deepcopy(dict(tables))
@@ -400,7 +400,7 @@ def _of_another_form(error: StageError, changes: Mapping[str, Any], others: Sequ
 
 
 def axis_written(tables: Mapping[str, Any]) -> AxisKind:
-    """Return the axis of a stage file's tables, with the force or torque per ampere.
+    """Return the kind of axis of a stage file's tables, with the force or torque per ampere.
 
     Errors in [axis] and [actuator] are found later.
     """
@@ -416,7 +416,7 @@ def axis_written(tables: Mapping[str, Any]) -> AxisKind:
 
 
 def _of_table(tables: Mapping[str, Any], name: str, key: str) -> Any:
-    """Return the value of a key of a table, or of a section; None if there is none."""
+    """Return the value of a key in a table, a mapping or a section; None if there is none."""
     table = tables.get(name)
     return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
@@ -425,15 +425,18 @@ _MOTOR_LAW = f"{MOTOR_FRICTION}.model"
 
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return unit, bound and example of every numeric key of a stage with these tables.
+    """Return unit, bound and example of every numeric key that a stage like this can have.
 
-    They are in the units of its axis.
+    `flat` has the stage's keys, whose tables decide. Units are those of its axis.
     """
     return {key: field.on(axis_of(flat)) for key, field in declared_keys(flat).items()}
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return the keys of a flat stage in their declared units, which belong to a linear axis."""
+    """Return unit, bound and example of every numeric key, in the units of a linear axis.
+
+    `flat` has the keys of a stage, whose tables decide.
+    """
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= _numeric_keys_of(flat, name, cls)
@@ -441,7 +444,10 @@ def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 
 
 def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> dict[str, Quantity | Number]:
-    """Return the numeric keys of a table, and of the tables in it."""
+    """Return unit, bound and example of the numeric keys of a table, and of the tables in it.
+
+    `cls` reads the table with this `name`.
+    """
     keys: dict[str, Quantity | Number] = {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
     for key, several in list_fields(cls).items():
         keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
@@ -451,15 +457,15 @@ def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> 
 
 
 def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tuple[str, type[Section]]]:
-    """Yield the tables in a table's arrays: their places in the stage file, and classes."""
+    """Yield the tables in a table's arrays: names such as "controller.filters.2", and classes."""
     for key, array in table_arrays(cls).items():
         yield from array.rows(flat, f"{name}.{key}").items()
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
-    """Return the violated bounds and rules of flat SI values, each as where and why.
+    """Return the bounds and rules that a stage's keys in SI break, each as where and why.
 
-    `flat` may hold arrays; `where` is then a boolean array, else a boolean.
+    Keys may have arrays; `where` is then a boolean array, else a boolean.
     """
     bounds = [
         (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
@@ -471,7 +477,10 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
 
 
 def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
-    """Yield each broken rule between keys, and where it is broken."""
+    """Yield each rule between keys, and where the stage's keys in SI break it.
+
+    The second is a boolean, or an array if keys have arrays.
+    """
     for name, owner in (("", Stage), *_tables(flat).items()):
         at_motor = name == MOTOR_FRICTION
         for rule in owner.rules:
@@ -484,7 +493,7 @@ def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
 
 
 def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
-    """Return the classes of the tables in a flat mapping."""
+    """Return the classes of a stage's tables by name; `flat` has the stage's keys."""
     classes = {
         "axis": AxisTable,
         "masses": Masses,
@@ -522,7 +531,7 @@ def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
 
 
 def _at(stage: Stage, key: str) -> Any:
-    """Return the value at a dotted key; None if there is none."""
+    """Return the value at a key such as "friction.static" in a stage; None if there is none."""
     value: Any = stage
     for name in key.split("."):
         value = value[int(name) - 1] if isinstance(value, tuple) else getattr(value, name)
@@ -530,22 +539,22 @@ def _at(stage: Stage, key: str) -> Any:
 
 
 def _toml(value: Any) -> str:
-    """Return a key's value, a scalar or a list, as TOML."""
+    """Write a key's value, a scalar or a list, as TOML."""
     return f"[{', '.join(map(as_toml, value))}]" if isinstance(value, list) else as_toml(value)
 
 
 def _written(value: Any) -> str:
-    """Return a key's value in an error message."""
+    """Write a key's value for an error message."""
     return f"[{', '.join(map(quoted, value))}]" if isinstance(value, list) else quoted(value)
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers as plain floats; texts and booleans as they are."""
+    """Convert numbers to plain floats; texts and booleans stay."""
     return value if isinstance(value, bool | str) else float(value)
 
 
 def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
-    """Return the flat keys with the defaults that follow from other keys."""
+    """Add to a stage's keys in SI the defaults that follow from other keys."""
     if (mass := motor_mass(flat)) is not None:
         flat.setdefault(MOTOR_MASS, mass)
     for key, value in controller_of(flat).with_defaults(flat).items():
@@ -558,7 +567,7 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
 
 
 def _under(tables: Mapping[str, Any], key: str) -> Any:
-    """Return the value of a dotted key of nested tables; None where there is none."""
+    """Return the value at a key like "friction.static" in nested tables; None if there is none."""
     place: Any = tables
     for name in key.split("."):
         place = place.get(name) if isinstance(place, Mapping) else None
@@ -566,9 +575,9 @@ def _under(tables: Mapping[str, Any], key: str) -> Any:
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key of nested tables or an element of an array; None removes it.
+    """Set a key such as "friction.static" in nested tables, or an element of an array.
 
-    Raises StageError.
+    None removes the key. Raises StageError.
     """
     *path, last = key.split(".")
     place: Any = tables
@@ -589,9 +598,9 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def _number(values: list[Any], key: str, depth: int) -> int:
-    """Return which element of an array a part of a dotted key means.
+    """Return the index, from 0, of an array element, by its number in a key: 1 for "2".
 
-    `depth` is the place of the part in the key. Raises StageError.
+    The number is the part of the key at the place `depth`. Raises StageError if the array `values` has no such element.
     """
     parts = key.split(".")
     number, array = parts[depth], ".".join(parts[:depth])

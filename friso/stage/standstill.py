@@ -70,7 +70,7 @@ EXAMPLES = {
 
 
 class FrictionSettings(NamedTuple):
-    """The settings against friction that a controller has."""
+    """Which settings against friction a controller has."""
 
     limit: bool = False
     leak: bool = False
@@ -87,7 +87,7 @@ NO_SETTINGS = FrictionSettings()
 
 
 def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
-    """Return the settings against friction of a stage given as flat keys."""
+    """Return which settings against friction a stage's controller has; `flat` has its keys."""
     names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
     limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
     gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)

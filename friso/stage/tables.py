@@ -32,7 +32,7 @@ class MotorConstant(Quantity):
 
     @property
     def expected(self) -> str:
-        """Return the values that the key accepts, in words."""
+        """Say in words what values the key accepts."""
         at_load = "at the load: of a motor of 0.5 N*m/A, 2 pi / lead times as much"
         return f"{super().expected}, {at_load if self.unit == 'N/A' else 'behind any gear'}"
 
@@ -82,7 +82,10 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
-        """Return further choices on which a law's equations depend, such as a whole exponent."""
+        """Return further choices on which a law's equations depend, such as a whole exponent.
+
+        They follow from its keys, `flat`.
+        """
         return None
 
     @staticmethod
@@ -92,7 +95,7 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> Any:
-        """Return what measurements show of the law.
+        """Return what measurements would show of a law with these keys, in SI.
 
         See `friso.equations.friction.measured.MeasuredFriction`.
         """
@@ -111,22 +114,24 @@ class FrictionSection(UncertainSection):
 
     @staticmethod
     def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys [SI] with measured steady friction, stiffness and damping, and with a `shape`.
+        """Return keys [SI] of the law for measured steady friction, stiffness and damping.
 
-        A law that declares `shape` can be fitted (`friso.identification.laws`).
+        `shape` has the values of the parameters in the class's `shape`. A law that declares these can be fitted
+        (`friso.identification.laws`).
         """
         return {}
 
     @staticmethod
     def left_open(measured: Any) -> dict[str, tuple[float, float]]:
-        """Return the keys that the measurements do not determine, and their ranges."""
+        """Return the keys that measured friction does not determine, and their ranges [SI]."""
         return {}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity that the stage violates; "" if passive or undeclared.
+        """Return the condition of passivity that the law violates; "" if passive or without one.
 
-        A law that is not passive returns more energy than it received, as no real friction does.
+        A law that is not passive returns more energy than it received, as no real friction does. `flat` has the keys in
+        SI.
         """
         return ""
 
@@ -136,20 +141,20 @@ register_friction = FRICTION.register
 
 
 def friction_law(name: str) -> type[FrictionSection]:
-    """Return the class of the registered law called `name`."""
+    """Return the class of the friction law called `name`."""
     return cast(type[FrictionSection], FRICTION.named(name))
 
 
 def passive_where(flat: Mapping[str, Any]) -> str:
-    """Return the condition of passivity that a stage's friction law violates.
+    """Return the condition of passivity that a stage's friction law violates, in words.
 
-    It is given in the units of the stage's axis; "" if the law is passive, or declares no condition.
+    It is given in the units of the stage's axis; "" if the law is passive, or has no condition.
     """
     return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
 
 def friction_laws() -> dict[str, type[FrictionSection]]:
-    """Return the registered laws by name."""
+    """Return the classes of all friction laws by name."""
     return cast(dict[str, type[FrictionSection]], FRICTION.classes)
 
 
@@ -185,9 +190,10 @@ class Parasitic(UncertainSection):
 
 
 class Bias(UncertainSection):
-    """Constant forces, positive towards larger positions: of a cable, a tilted rail, or the weight of a vertical axis.
+    """Constant forces, positive towards larger positions.
 
-    Runs begin with the actuator carrying their sum.
+    They are due to a cable, a tilted rail, or the weight of a vertical axis. Runs begin with the actuator carrying
+    their sum.
     """
 
     cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None

@@ -68,13 +68,16 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the motor's mass at the load [kg], from its inertia; None without an inertia."""
+    """Return the motor's mass at the load [kg], from its inertia; None without an inertia.
+
+    `flat` has the stage's keys in SI.
+    """
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
 
 
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the flat keys with the motor's friction as [friction], if the guide has none."""
+    """Return a stage's keys with the motor's friction as [friction], if the guide has none."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
     return of_motor(flat) if alone else flat
 
@@ -85,7 +88,7 @@ def moving_mass(flat: Mapping[str, Any]) -> Any:
 
 
 def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the flat keys with the motor's friction under [friction], and without [conditions].
+    """Return a stage's keys with the motor's friction under [friction], without [conditions].
 
     The conditions belong to the guide, whose friction is left out.
     """

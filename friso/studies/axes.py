@@ -30,7 +30,8 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 class SweptAxis:
     """Axis of a study: a swept key, a scaling, or a free variable that links use.
 
-    It has SI values (or words and booleans), their unit, and their scale.
+    `values` (n,) are SI numbers, or words or booleans; `numeric` is true for numbers. `unit` is their SI unit, and
+    `scale` the spacing of the axis in figures.
     """
 
     name: str
@@ -42,7 +43,10 @@ class SweptAxis:
 
 @dataclass(frozen=True)
 class SweptRange:
-    """The ends of a range [SI], its number of points (None: not stated), and their spacing."""
+    """A range from `first` to `last` [SI] of an axis: its number of points, and their spacing.
+
+    `count` is None if the text does not state a number of points.
+    """
 
     name: str
     first: float
@@ -52,13 +56,16 @@ class SweptRange:
     scale: Scale
 
     def at(self, share: np.ndarray) -> np.ndarray:
-        """Return the values at fractions, from 0 to 1, of the way from the first to the last."""
+        """Return the values [SI] at fractions `share`, 0 to 1, of the way through the range.
+
+        On a logarithmic scale the way is that of the logarithms.
+        """
         if self.scale == "log":
             return np.exp(np.log(self.first) + share * (np.log(self.last) - np.log(self.first)))
         return self.first + share * (self.last - self.first)
 
     def axis(self) -> SweptAxis:
-        """Return the axis with `count` points, both ends exactly as given."""
+        """Return the axis of this range with `count` points, both ends exactly as stated."""
         space = np.geomspace if self.scale == "log" else np.linspace
         return SweptAxis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
 
@@ -66,8 +73,8 @@ class SweptRange:
 def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
     """Return an axis from a text, a list or an array with a unit; a range stays a `SweptRange`.
 
-    `name` is a key or a scaling, or with `free` a name that links use. With `log` a range that does not state its
-    spacing is logarithmic. Raises InputError.
+    `name` is a key or a scaling of the stage, or with `free` a name that links use. With `log`, a range that does not
+    state its spacing is logarithmic. Raises InputError for a name or values that the stage cannot have.
     """
     field, scales = stage.numeric_keys().get(name), name in SCALINGS and not free
     if field is None and not free and not scales:
@@ -89,8 +96,8 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 class _Reader:
     """Reader of the numbers of an axis, of any sign.
 
-    A value that no stage may have makes only its cells invalid, not the whole axis. A free variable (`field` None)
-    takes the SI unit of the first value's kind of quantity.
+    `field` is the key's number or quantity. A free variable has none (None): it takes the SI unit of its first value's
+    kind of quantity. Signs are free because a value that no stage may have makes only its cells invalid.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:
@@ -102,7 +109,7 @@ class _Reader:
         return "" if self.field is None else self.field.unit
 
     def text(self, entry: Any) -> float:
-        """Return the SI value of a text such as "8 Hz", or of "0.1" for a number without unit."""
+        """Return the SI value of an axis value such as "8 Hz", or "0.1" for a number without unit."""
         entry = entry.strip() if isinstance(entry, str) else entry
         bare = _number(entry)
         if self.field is None:
@@ -130,7 +137,7 @@ class _Reader:
 
 
 def _number(value: Any) -> float | None:
-    """Return a bare number as given, None for anything else."""
+    """Return a number, or a text that is only a number, as float; None for anything else."""
     if isinstance(value, int | float | np.number) and not isinstance(value, bool):
         return float(value)
     try:
@@ -140,7 +147,10 @@ def _number(value: Any) -> float | None:
 
 
 def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
-    """Read a range of an axis, such as "1 Hz..40 Hz:41", into its values."""
+    """Read a range of an axis, such as "1 Hz..40 Hz:41", into its ends, count and spacing.
+
+    With `log` the spacing is logarithmic unless the text states it. Raises InputError for a text that is no range.
+    """
     match = _RANGE.fullmatch(text)
     if match is None:
         raise InputError("", quoted(text), "FIRST..LAST:POINTS, optionally followed by :log", RANGE_EXAMPLE)
@@ -156,7 +166,10 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
 
 
 def _count(text: str, digits: str | None) -> int | None:
-    """Read the number of values of a range."""
+    """Read the number of points of a range from its `digits`, None if it has none.
+
+    `text` is the whole range, for the error. Raises InputError for fewer than two points, or too many.
+    """
     settings = StudySettings.current()
     if digits is None:
         return None
@@ -168,7 +181,10 @@ def _count(text: str, digits: str | None) -> int | None:
 
 
 def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis:
-    """Make an axis from values that were given one by one."""
+    """Make an axis from its values one by one: a list, a text with commas, or (array, unit).
+
+    Raises InputError for values that are no finite numbers.
+    """
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):
@@ -185,7 +201,7 @@ def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis
 
 
 def _items(values: Any) -> list[Any]:
-    """Return the values of a list. Raises InputError for a value that is no list."""
+    """Return the items of a list or array as a list. Raises InputError for anything else."""
     try:
         return list(values)
     except TypeError:
@@ -193,7 +209,10 @@ def _items(values: Any) -> list[Any]:
 
 
 def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
-    """Return an axis of words or booleans, each of which the stage takes."""
+    """Return an axis of words or booleans for a key, after trying each of them in the stage.
+
+    Raises InputError for a word that the stage does not take, and for an unknown key.
+    """
     options = (
         [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else _items(values)
     )
@@ -214,5 +233,9 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
 def read_axes(
     stage: Stage, axes: Mapping[str, AxisValues], free: frozenset[str], log: bool = False
 ) -> tuple[SweptAxis | SweptRange, ...]:
-    """Return all axes, as `read_axis` reads them. Raises InputError."""
+    """Return all axes of a study from texts, lists or arrays with a unit, by name.
+
+    Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. With `log`, ranges
+    are logarithmic unless they state their spacing. Raises InputError.
+    """
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

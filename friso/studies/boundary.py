@@ -28,12 +28,12 @@ def boundary(
 ) -> Diagram | Plane:
     """Return where the hunting cycle of a stage loses stability, over one key or two.
 
-    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``; a range is logarithmic with ":log" behind
+    `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``. A range is logarithmic with ":log" behind
     it, or with `log`. `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is
     a `Diagram`: all branches of cycles over the range, and the points at which they flip or fold. With two it is a
     `Plane`: the curves on which cycles flip or fold. The motion of the stage file plays no part. `begins` is called
-    once the input has been checked, `progress` as cycles are followed. Raises InputError for a wrong range, link,
-    tolerance or stage (one that cannot hunt).
+    once the input has been checked, and `progress` while cycles are followed. Raises InputError for a wrong range,
+    link, tolerance or stage (one that cannot hunt).
     """
     settings = StudySettings.current()
     checked_rtol(rtol)
@@ -62,7 +62,7 @@ def boundary(
 
 
 def _refuse_impossible(space: Space, example: str) -> None:
-    """Raise InputError if the ranges contain no valid stage."""
+    """Raise InputError if no stage in the ranges is valid, from a coarse grid of stages."""
     settings = StudySettings.current()
     points = space.grid(settings.tried_values)
     if not space.allowed(points).any():
@@ -71,7 +71,11 @@ def _refuse_impossible(space: Space, example: str) -> None:
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
-    """Read a range of a key or of a free variable for the boundary of hunting."""
+    """Read the text of a range, such as "0.1 mm..2 mm", for the boundary of hunting.
+
+    `name` is a key of the stage, or with `free` a variable that links use. Raises InputError for a range with a number
+    of points, or with ends that the key may not have.
+    """
     read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
         raise InputError(

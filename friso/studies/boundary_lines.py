@@ -1,6 +1,6 @@
-"""Convert boundaries of hunting to numbers.
+"""Convert boundaries of hunting to numbers for tables, files and figures.
 
-They are branches and curves point by point, and verdicts at stages in between.
+The numbers are the points of branches and curves, and the verdicts at stages between them.
 """
 
 from __future__ import annotations
@@ -18,17 +18,19 @@ CycleShape = Literal["symmetric", "asymmetric", "whole"]
 not symmetric)."""
 
 ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
-"""Verdicts on the stages of a boundary, from simulations and followed branches. The last two mark stages whose
-simulations failed or did not settle, and invalid stages."""
+"""Verdicts on the stages of a boundary, from simulations and followed branches.
+
+UNKNOWN marks stages whose simulations failed or did not settle; INVALID marks stages that break a rule.
+"""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A branch of cycles over one key, or a curve in two: its n points in order.
+    """A branch of cycles over one key, or a curve in two keys: its n points in order.
 
-    `at` [SI], shape (n, keys), has the values of the keys, and `error` their error (NaN except at special points).
-    `kinds` are the kinds of special points ("" for ordinary ones). `amplitude` [m], `period` [s] and `multiplier` have
-    the shape (n,). `ends` tells how the line ends on either side.
+    `at` [SI], shape (n, keys), has the values of the keys. `error` is their error, NaN except at special points (flips
+    and folds). `kinds` has the kind of each special point, "" for an ordinary one. `amplitude` [m], `period` [s] and
+    `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line ends on either side.
     """
 
     shape: CycleShape
@@ -42,22 +44,22 @@ class Line:
 
     @property
     def special(self) -> np.ndarray:
-        """Return the numbers of the special points."""
+        """Return the indices of the special points (flips and folds)."""
         return np.flatnonzero([bool(kind) for kind in self.kinds])
 
     @property
     def ordinary(self) -> np.ndarray:
-        """Return the numbers of the points that are not special."""
+        """Return the indices of the points that are not special."""
         return np.flatnonzero([not kind for kind in self.kinds])
 
     @property
     def attracts(self) -> np.ndarray:
-        """Tell whether the cycle is stable from each point to the next, shape (n - 1,)."""
+        """Tell whether the cycle is stable between each point and the next, shape (n - 1,)."""
         return np.abs(self.multiplier[1:] + self.multiplier[:-1]) < 2
 
 
 class _Row(NamedTuple):
-    """Point of a line: its place in the box of the keys, its error, its cycle and its kind."""
+    """Point of a line: keys and their error as fractions of their ranges, cycle and kind."""
 
     at: np.ndarray
     error: np.ndarray
@@ -78,9 +80,9 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 
 
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
-    """Return the points of a branch and its special points inside the range, in order.
+    """Return the points of a branch and its `special` points inside the range, in order.
 
-    Points within the error of a special point are left out, because it is unknown whether they are stable.
+    Ordinary points within the error of a special point are left out, because it is unknown whether they are stable.
     """
     path = np.array([point.vector for point in branch.points])
     ordinary = [
@@ -99,14 +101,20 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
-    """Return where along a path a point lies, in legs from its start."""
+    """Return how many legs from the start of a path a point lies; part of a leg counts in part.
+
+    `path` (n, d) has the points of the path, and `vector` (d,) is the point.
+    """
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
     return leg + before[leg] / (before[leg] + after[leg])
 
 
 def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
-    """Make the line of a branch or a curve from its rows, with values, errors and cycles."""
+    """Make a line from its rows: keys [SI], their errors, and the numbers of the cycles.
+
+    `traced` is the branch or curve from which the rows come.
+    """
     at = np.array([row.at for row in rows])
     values = _values(result.space, at)
     return Line(
@@ -126,9 +134,9 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 
 
 def place_verdicts(result: Diagram) -> list[str]:
-    """Return the verdicts at stages spaced evenly over the range.
+    """Return the verdicts at stages spaced evenly over the range of a diagram.
 
-    They come from simulations, and from all branches that reach the stages.
+    They come from simulations, and from all branches of cycles that reach these stages.
     """
     verdicts = _verdicts(result)
     return [
@@ -138,16 +146,16 @@ def place_verdicts(result: Diagram) -> list[str]:
 
 
 def end_verdicts(result: Diagram) -> tuple[str, str]:
-    """Return the verdicts at both ends of the range."""
+    """Return the verdicts at the lower and the upper end of the range of a diagram."""
     verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
     return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
 
 
 class StabilityChange(NamedTuple):
-    """Change between stages that hunt and stages that do not.
+    """Change between stages that hunt and stages that do not, along a key.
 
-    `begins` tells whether hunting begins there as the key rises. The change lies between the two values [SI], which are
-    equal if a followed cycle gains or loses stability there.
+    `begins` is true if hunting begins there as the key rises. The change lies between the values `low` and `high` [SI],
+    which are equal if a followed cycle gains or loses stability there.
     """
 
     begins: bool
@@ -156,10 +164,10 @@ class StabilityChange(NamedTuple):
 
 
 def stability_changes(result: Diagram) -> list[StabilityChange]:
-    """Return where hunting begins and ends over the range, in order.
+    """Return the changes at which hunting begins and ends over the range, in order.
 
-    Verdicts within the error of a special point do not locate a change, because unstable cycles are so weak there that
-    runs may stay on them. But they do show hunting between stages that do not hunt.
+    Verdicts within the error of a special point (flip or fold) do not locate a change. Unstable cycles are so weak
+    there that runs may stay on them. But such verdicts do show hunting between stages that do not hunt.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
@@ -195,9 +203,9 @@ def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
 
 
 def begins_at(line: Line, k: int) -> bool | None:
-    """Tell whether a cycle gains stability at a special point as the key rises.
+    """Tell whether a cycle gains stability at point `k` of a line as the key rises.
 
-    None if it is stable on both sides of the point along its branch, or on neither.
+    The point is a special one (flip or fold). None if the cycle is stable on both sides of it, or on neither.
     """
     beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
     if beside[0] == beside[1]:
@@ -207,9 +215,9 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Tell whether a branch of cycles is stable just below and above a value of the swept key.
+    """Tell whether a branch has a stable cycle on both sides of a stage in the range.
 
-    False if a branch is in doubt at this value.
+    `place` is the stage's fraction of the range. False if the stability of a branch is unknown there.
     """
     if result.in_doubt(np.array([place]))[0]:
         return False
@@ -219,7 +227,7 @@ def _attracts_at(result: Diagram, place: float) -> bool:
 
 
 def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """Return the values [SI] of both keys at every node of the grid, and the verdict there.
+    """Return the values [SI] of both keys at every node of a plane's grid, and the verdict.
 
     The first key varies slowest.
     """
@@ -230,20 +238,20 @@ def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 
 def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
-    """Return the values [SI] of both keys, and the verdict, at the four corners.
+    """Return the values [SI] of both keys at the four corners of a plane, and the verdict.
 
-    They are ordered as both low, second high, first high, both high.
+    The order is both low, second high, first high, both high.
     """
     nodes, last = node_verdicts(result), result.nodes - 1
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
 
 class PlaneEdge(NamedTuple):
-    """Edge of hunting along one key, for each value tried of the other key [SI].
+    """Edge of hunting along one key of a plane, for n values of the other key.
 
-    `along` is the number of the first key, and `across` (n,) are the values of the other one, ascending. `below` tells
-    whether hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,), which are equal if a
-    curve passes.
+    `along`, 0 or 1, is the key along which the edge is sought, and `across` (n,) are the ascending values [SI] of the
+    other key. `below` is true if hunting is possible below the edge. The edge lies between `low` and `high` [SI] (n,),
+    which are equal if a curve passes.
     """
 
     along: int
@@ -256,8 +264,8 @@ class PlaneEdge(NamedTuple):
 def plane_edge(result: Plane) -> PlaneEdge | None:
     """Return the edge of hunting along one of the keys of a plane, the first if possible.
 
-    Hunting must end once, and on one side, for every value of the other key. Returns None otherwise, and if the verdict
-    at a node is not known.
+    Along this key, hunting must end exactly once, on the same side for every value of the other key. Returns None
+    otherwise, and if the verdict at a node is unknown.
     """
     nodes = node_verdicts(result)
     if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
@@ -283,7 +291,7 @@ def plane_edge(result: Plane) -> PlaneEdge | None:
 
 
 def _crossings(result: Plane, along: int, value: float) -> list[float]:
-    """Return the values [SI] of one key at which curves pass a `value` [SI] of the other one."""
+    """Return the values [SI] of key `along` at which curves pass a `value` of the other key."""
     crossings = []
     for line in lines(result):
         at, other = line.at[:, along], line.at[:, 1 - along] - value
@@ -298,7 +306,7 @@ EndKind = Literal["range", "closed", "meets", "lost"]
 
 
 class CurveEnd(NamedTuple):
-    """An end of the curve with number `line`: its place [SI], shape (2,), and the kind of end."""
+    """An end of the curve with the index `line`: both keys `at` it [SI], and the kind of end."""
 
     line: int
     at: np.ndarray
@@ -319,7 +327,7 @@ def curve_ends(result: Plane) -> list[CurveEnd]:
 
 
 def curve_meetings(result: Plane) -> list[Meeting]:
-    """Return where curves of a plane meet: places and errors as values of the keys [SI]."""
+    """Return where curves of a plane meet, with positions and errors as key values [SI]."""
     meetings = []
     for meeting in result.meetings:
         places = _values(result.space, meeting.places)
@@ -329,10 +337,10 @@ def curve_meetings(result: Plane) -> list[Meeting]:
 
 
 def lost_places(result: Plane) -> np.ndarray:
-    """Return the places [SI] of a change where no curve could be begun, (places, 2)."""
+    """Return keys [SI] where the verdict changes but no curve could be begun, (count, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:
-    """Return the verdicts of stages by the results of their simulations."""
+    """Return the verdicts on the stages that were simulated for a diagram or a plane, in order."""
     return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

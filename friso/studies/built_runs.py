@@ -1,4 +1,4 @@
-"""Run cells with the real drive in the machine's surroundings."""
+"""Run cells with the real drive, on the shaking floor of their stage file."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ TIMING = tuple(
 def runs_as_built(stage: Stage, names: Sequence[str]) -> bool:
     """Tell whether cells run with the real drive: if only metrics of runs are requested.
 
-    Verdicts, and the runs that they need, are those of the ideal machine.
+    `names` are the metrics. Verdicts, and the runs that they need, are those of the ideal machine.
     """
     return is_as_built(stage) and of_runs_alone(names)
 
 
 def of_runs_alone(names: Sequence[str]) -> bool:
-    """Tell whether all given metrics are computed from runs."""
+    """Tell whether all metrics in `names` are computed from runs; other names do not count."""
     every = metrics()
     return all(every[name].source == "run" for name in names if name in every)
 
@@ -43,11 +43,11 @@ def of_runs_alone(names: Sequence[str]) -> bool:
 def built_runs(
     stage: Stage, flat: Mapping[str, Any], count: int, threads: int | None, cancel: np.ndarray | None
 ) -> Iterator[tuple[Runs, Measures]]:
-    """Run cells of one structure with their real drive, and measure them.
+    """Run cells of one structure with their real drive, and yield runs and their measures.
 
-    `flat` has flat keys to SI numbers or arrays (count,). All cells have equal noise. The runs have statistics and
-    statuses; turning points are taken from the samples, and are in the measures. Once `cancel` is set, no further chunk
-    begins.
+    `flat` has keys such as "friction.static", with SI numbers or arrays (count,). All cells have the same noise. The
+    runs hold only statistics and statuses: turning points come from the drive's samples, and are in the measures. Once
+    `cancel` is set, no further chunk begins.
     """
     timing = [np.broadcast_to(flat[key], (count,)) for key in TIMING if key in flat]
     kinds, which = np.unique(np.stack([np.zeros(count), *timing]), axis=1, return_inverse=True)

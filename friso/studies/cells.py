@@ -1,6 +1,6 @@
 """Run cells: stages that differ in some keys.
 
-Columns of values become columns of measures.
+Values of keys go in as columns, and metrics come out as columns, with one entry per cell.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
 INFERRED = "inferred"
-"""First words of the status of a cell that was inferred from agreeing neighbours instead of run."""
+"""First words of the status of a cell that was not run, because its neighbours agree."""
 
 
 SURVEYS: Mapping[MetricBasis, Callable[..., StageAttractors]] = {"sketch": sketch_attractors, "survey": find_attractors}
-"""Searches for attractors, by the source of a metric."""
+"""Searches for attractors, by the source of the metrics that need them."""
 
 
 def run_cells(
@@ -55,13 +55,14 @@ def run_cells(
     threads: int | None = 1,
     cancel: np.ndarray | None = None,
 ) -> Columns:
-    """Run one stage per entry of the columns, shape (cells,) each.
+    """Run one stage per entry of the columns, shape (cells,) each, and return its metrics.
 
-    Columns are axis names to SI values, words or booleans. If only metrics of runs are named and the file describes the
-    drive, cells run with the real drive (`friso.studies.built_runs`). The result holds the usual metrics of a run and
-    the named ones (`friso.studies.metric`), each of shape (cells,). An invalid cell has the word "invalid", and the
-    reason in its status; a cell whose run was not completed has the outcome "failed". Setting cancel[0] from another
-    thread ends the work early: cells not run by then keep the outcome "".
+    Columns are axis names to SI values, words or booleans. `links` are SI expressions for further keys. If only metrics
+    of runs are named and the file describes the drive, cells run with the real drive (`friso.studies.built_runs`). The
+    result holds the usual metrics of a run and those in `names` (`friso.studies.metric`), each of shape (cells,). An
+    invalid cell has the word "invalid", and the reason in its status. A cell whose run was not completed has the
+    outcome "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the outcome
+    "".
     """
     table = _Table(len(next(iter(columns.values()))), in_order((*usual_metrics(), *names)))
     parts = list(by_words(stage, links, columns))
@@ -92,13 +93,19 @@ def run_cells(
 def ideal_runs(
     shape: Structure, flat: Mapping[str, Any], count: int, options: RunOptions
 ) -> Iterator[tuple[Runs, Measures]]:
-    """Run cells of one structure with the controller in continuous time, and measure them."""
+    """Run cells of one structure with the controller in continuous time, and measure them.
+
+    Yields runs and their measures in chunks. `flat` has SI numbers or arrays (count,) by key.
+    """
     for runs in run_chunks(kernel(shape), flat, count, options):
         yield runs, measure_runs(runs.part(flat), runs)
 
 
 Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
-"""Flat SI form of cells, and their numbers, for each combination of words and booleans."""
+"""Keys of cells with SI values, and the cells' indices, for each combination of words.
+
+Booleans count as words.
+"""
 
 
 def cell_attractors(
@@ -110,8 +117,9 @@ def cell_attractors(
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
     """Yield the attractors of the chosen cells, grouped by equations.
 
-    `chosen` has the shape (cells,). Each part has flat SI values, numbers of cells, and their attractors by a function
-    such as `find_attractors`. The motion does not matter: of cells that differ only in the motion, one is surveyed.
+    `chosen` has the shape (cells,). Yields keys with SI values, indices of cells, and their attractors, which the
+    function `find` seeks, by default `find_attractors`. The motion does not matter: of cells that differ only in the
+    motion, one is surveyed.
     """
     for flat, cells, _ in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), find, threads, cancel)
@@ -124,7 +132,7 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """Find the attractors of stages of one structure.
+    """Find the attractors of `count` stages of one structure with `find`.
 
     Stages that differ only in their motion are searched once.
     """
@@ -138,7 +146,10 @@ def _once(
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return which cells are valid stages, shape (cells,)."""
+    """Return which cells are valid stages, shape (cells,).
+
+    `columns` are axis names to values (cells,), and `links` SI expressions for further keys.
+    """
     table = _Table(len(next(iter(columns.values()))), ("outcome", STATUS))
     for flat, cells in by_words(stage, links, columns):
         table.invalidate(cells, flat)
@@ -146,7 +157,7 @@ def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, 
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Return the flat SI form of all cells, for numeric columns only.
+    """Return all keys of all cells, with SI numbers or arrays (cells,); columns are numeric.
 
     Links are applied first, then scalings.
     """
@@ -159,7 +170,7 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
     """Yield the chosen cells, shape (cells,), grouped by equations.
 
-    Each part has flat SI values, numbers of cells, and the structure.
+    Each group has keys with SI values, indices of cells, and the structure (what decides the equations).
     """
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):
@@ -170,7 +181,7 @@ def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, A
 def by_words(
     stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]
 ) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-    """Yield flat SI values and cell numbers for each combination of words among the columns.
+    """Yield keys with SI values, and cell indices, for each combination of words in the columns.
 
     Booleans count as words.
     """
@@ -188,9 +199,9 @@ def by_words(
 
 
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
-    """Yield the numbers of the valid cells, grouped by equations.
+    """Yield structures and the indices of their cells, for the valid ones of `count` cells.
 
-    Cells are grouped by the few keys that determine the structure.
+    The structure decides the equations. Cells are grouped by the few keys that determine it.
     """
     decisive = [key for key in decisive_keys(flat) if np.ndim(flat.get(key, 0.0))]
     groups: dict[Structure, list[np.ndarray]] = {}
@@ -209,7 +220,7 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
-    """The variables of a study while they are filled, one entry per cell.
+    """The metrics and statuses of cells while they are filled in, one entry per cell.
 
     `settled` [s], shape (count,), is the time from which each run stays within 10 um of its reference.
     """
@@ -220,11 +231,14 @@ class _Table:
         self.metrics = {name: every[name] for name in self.columns if name in every}
 
     def of(self, source: MetricBasis) -> dict[str, Metric]:
-        """Return the metrics with a given source."""
+        """Return the metrics computed from one source: "run", "sketch" or "survey"."""
         return {name: metric for name, metric in self.metrics.items() if metric.source == source}
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
-        """Mark the invalid cells, each with the first reason found."""
+        """Mark the invalid ones of some cells, each with the first rule that it breaks.
+
+        `flat` has the keys of these `cells`, with SI values.
+        """
         for broken, why in violations(flat):
             which = cells[np.broadcast_to(broken, cells.shape) & self.valid[cells]]
             for name in worded():
@@ -243,13 +257,13 @@ class _Table:
         return ~np.isin(self.columns["outcome"], ("invalid", ""))
 
     def motions(self, cells: np.ndarray) -> Motions:
-        """Return the results of the cells' motions."""
+        """Return how the motions of some cells went: completion, peaks, swing and settling."""
         peaks, swing = (self.columns[name][cells] for name in ("peaks", "peak_to_peak"))
         away = self.columns[STATUS][cells] == Status.DIVERGED.text
         return Motions(self.columns["outcome"][cells] != FAILED, away, peaks, swing, self.settled[cells])
 
     def write_runs(self, cells: np.ndarray, evidence: RunEvidence) -> None:
-        """Write status and metrics of the cells that were run before the work was cancelled."""
+        """Write status and metrics of those `cells` that were run before the work was cancelled."""
         measures, ran = evidence.measures, evidence.runs.results.statuses != Status.NOT_RUN
         columns = {name: metric.compute(evidence) for name, metric in self.of("run").items()}
         for name, column in (columns | {STATUS: _STATUS[measures.status]}).items():
@@ -258,5 +272,5 @@ class _Table:
 
 
 def unfilled(variable: str, shape: int | tuple[int, ...]) -> np.ndarray:
-    """Return an array for a variable before any cell was run, of empty texts or of NaN."""
+    """Return an array for a study's variable before any cell was run: empty texts or NaN."""
     return np.full(shape, "", dtype=object) if is_text(variable) else np.full(shape, np.nan)

@@ -23,11 +23,12 @@ logger = logging.getLogger("friso")
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[Crew]:
-    """Return a crew made of the workers of a Dask scheduler, such as "tls://10.0.0.1:8786".
+    """Yield a crew of workers: the worker threads of a Dask scheduler.
 
-    Every thread of a worker computes one block at a time, in that thread alone. Certificates come from Dask's
-    configuration (distributed.comm.tls). Without TLS, anyone who can reach the address can run code; this is logged.
-    Raises InputError if the scheduler does not answer, has no workers, or one with another version of friso.
+    `scheduler` is an address such as "tls://10.0.0.1:8786". Every thread computes one block at a time, in that thread
+    alone. Certificates come from Dask's configuration (distributed.comm.tls). Without TLS, anyone who can reach the
+    address can run code; this is logged. Raises InputError if the scheduler does not answer, has no workers, or one
+    with another version of friso.
     """
     settings = StudySettings.current()
     from distributed import Client, KilledWorker
@@ -50,7 +51,10 @@ def connected(scheduler: str) -> Iterator[Crew]:
 
 
 async def _answers(scheduler: str) -> None:
-    """Raise OSError or ValueError if nothing answers at the address, because a client that fails lingers for long."""
+    """Raise OSError or ValueError if nothing answers at the scheduler's address.
+
+    It is tried first because Dask's client, if it fails, lingers for long.
+    """
     settings = StudySettings.current()
     from distributed.comm.core import connect
     from distributed.security import Security
@@ -67,9 +71,9 @@ def run_checked(
     metrics: Sequence[str],
     expected: str,
 ) -> Columns:
-    """Run cells on a worker after checking the version of its friso.
+    """Run cells on a worker, after checking that its friso has the `expected` equations.
 
-    A worker that joined later was not checked before.
+    Raises InputError otherwise. Workers that joined after the study began were not checked before.
     """
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())

@@ -30,9 +30,9 @@ from friso.version import VERSION
 
 @dataclass(frozen=True)
 class DoctorCheck:
-    """One check of the installation: its subject, the result in words, and whether it works.
+    """One check of the installation: its subject, the result as text, and whether it works.
 
-    `remedy` is advice if it does not.
+    `remedy` is advice if it does not work.
     """
 
     subject: str
@@ -42,9 +42,9 @@ class DoctorCheck:
 
 
 def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
-    """Yield all checks of the installation, one by one.
+    """Yield all checks of the installation, one by one, as they are made.
 
-    Folders below the user's own begin with ~ unless `full_paths`.
+    Paths below the user's home folder begin with ~ unless `full_paths`.
     """
     yield DoctorCheck("friso", VERSION)
     yield DoctorCheck(
@@ -134,9 +134,9 @@ def _compiling() -> str:
 
 
 def _running() -> str:
-    """Run the stage of the template, which hunts with its joint locked.
+    """Run the template's stage, which hunts with its joint locked, and report the speed.
 
-    Raises RuntimeError for another result.
+    Raises RuntimeError if it does not swing as it should.
     """
     tuning = StudySettings.current()
     from friso.engine.batch import run_chunks

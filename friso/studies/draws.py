@@ -1,4 +1,4 @@
-"""Judge an uncertain stage by the verdicts on many stages drawn from it."""
+"""Judge an uncertain stage by the verdicts on many stages drawn at random from it."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class Fates:
-    """Verdicts on drawn stages, and which of their loops are unstable, both (count,).
+    """Verdicts on drawn stages, and which of their linear loops are unstable, both (count,).
 
     Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
-    sticks, or slides. `amplitudes` [m], half of peak to peak, and `periods` [s] belong to the first draws, shape
-    (count,) or shorter; NaN for a stage that has no attractor, or an uncertain one.
+    sticks, or while it slides. `amplitudes` [m], half of peak to peak, and `periods` [s] belong to the first stages
+    drawn, shape (count,) or shorter. They are NaN for a stage that has no attractor, or an uncertain one.
     """
 
     verdicts: np.ndarray
@@ -40,7 +40,7 @@ class Fates:
         return {word: int(np.count_nonzero(self.verdicts == word)) for word in VERDICTS}
 
     def share(self, words: tuple[str, ...]) -> Share:
-        """Return the probability of any of these verdicts."""
+        """Return the probability that a drawn stage has any of these verdicts."""
         return share(np.isin(self.verdicts, words), ~np.isin(self.verdicts, UNDECIDED))
 
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
@@ -65,9 +65,10 @@ class Fates:
 
 
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
-    """Judge the drawn stages as given and, if they have a joint, also locked and free.
+    """Judge the drawn stages in each variant: as in the file and, with a joint, locked and free.
 
-    After Ctrl-C, the result has the stages judged in all variants by then, without sizes of hunting.
+    The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then,
+    without amplitudes and periods of hunting.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -94,9 +95,10 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 
 @dataclass(frozen=True)
 class DrawnEdges:
-    """Edges of hunting of drawn stages in bandwidth [Hz], (count,), from `low` to `high`.
+    """Edges of hunting of drawn stages: the bandwidths [Hz] below which they hunt, (count,).
 
-    Both are NaN for a stage whose hunting does not begin or end within the tried bandwidths.
+    Each edge lies between `low` and `high`. Both are NaN for a stage whose hunting does not begin or end within the
+    tried bandwidths.
     """
 
     low: np.ndarray
@@ -104,9 +106,10 @@ class DrawnEdges:
 
 
 def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
-    """Find the edge of hunting of the first drawn stages, near the stage's own `margin`.
+    """Find up to which bandwidth the first drawn stages hunt, near the stage's own `margin`.
 
-    The edge is one in bandwidth. Returns None if there is no margin, or no key states a bandwidth.
+    The margin is that from the stage to its edge of hunting. Returns None if there is no margin, or if the controller
+    has no bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())
@@ -127,9 +130,9 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
 
 
 def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float) -> int:
-    """Return how many stages may be drawn for a fixed amount of work.
+    """Return how many stages to draw for a fixed amount of work, measured on a few draws.
 
-    It is a power of two, for which Sobol's points are spread evenly.
+    The number is a power of two, for which Sobol's points are spread evenly.
     """
     settings = StudySettings.current()
     with allowance() as spent:
@@ -140,9 +143,10 @@ def affordable(stage: Stage, correlations: Correlations, seed: int, rtol: float)
 
 @dataclass(frozen=True)
 class Draws:
-    """Stages drawn from an uncertain one with a seed, and their fates case by case.
+    """Stages drawn from an uncertain one with a seed, and verdicts on them by variant.
 
-    After an interruption they are fewer than were `asked` for, and have no `edges`.
+    Variants are as in the file, locked and free. After an interruption there are fewer stages than were `asked` for,
+    and no `edges`.
     """
 
     stage: Stage
@@ -164,7 +168,7 @@ class Draws:
     ) -> Draws:
         """Judge the stages of a sample, and find the edges of hunting of the first ones.
 
-        Edges are looked for near the stage's `margin`. `fates` makes the verdicts.
+        Edges are sought near the stage's `margin`, its distance from the edge. The function `fates` makes the verdicts.
         """
         judged = fates(stage, sample, rtol, progress)
         count = len(next(iter(judged.values())).verdicts)
@@ -178,7 +182,7 @@ class Draws:
 
 
 def different(stage: Stage) -> dict[str, Stage]:
-    """Return the distinct variants of a stage."""
+    """Return the variants of a stage (as in the file, locked, free) without repetitions."""
     variants: dict[str, Stage] = {}
     for name, variant in stage.variants().items():
         if variant not in variants.values():
@@ -187,7 +191,7 @@ def different(stage: Stage) -> dict[str, Stage]:
 
 
 def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally) -> Fates:
-    """Judge a chunk of the drawn stages."""
+    """Judge those of the drawn stages that are in a slice, the `chunk`."""
     flat = laid_over(stage, {key: values[chunk] for key, values in sample.keys.items()})
     count = chunk.stop - chunk.start
     judged = Fates(judge_many(flat, count, rtol), loops_unstable(flat, count))
@@ -196,12 +200,12 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
 
 
 def _joined(parts: Sequence[Fates]) -> Fates:
-    """Return the fates of several groups of stages as those of one."""
+    """Join the verdicts on several groups of stages into one `Fates`."""
     return Fates(np.concatenate([part.verdicts for part in parts]), np.concatenate([part.unstable for part in parts]))
 
 
 def _with_swings(stage: Stage, sample: Sample, judged: Fates) -> Fates:
-    """Add amplitudes and periods for those of the first drawn stages that hunt."""
+    """Add amplitudes and periods of hunting of the first drawn stages, NaN where not certain."""
     first_ones = min(sample.count, StudySettings.current().draws_of_a_swing)
     amplitudes, periods = np.full((2, first_ones), np.nan)
     swinging = np.flatnonzero(np.isin(judged.verdicts[:first_ones], ATTRACTED))

@@ -22,11 +22,11 @@ _T = TypeVar("_T")
 
 @dataclass
 class Crew:
-    """An executor with its size and a function to end it.
+    """The workers of a study: an executor, with its size and a function that computes a block.
 
-    `size` is the number of blocks computed side by side, and `shares` the number of blocks that a study needs to keep
-    all busy. `cancel`, a flag of shape (1,), ends blocks in progress early. `failures` are the errors that mean that
-    the executor itself failed.
+    `task` is that function, called with `arguments`. `size` is the number of blocks computed side by side, and `shares`
+    the number of blocks that a study needs to keep all workers busy. `cancel`, a flag of shape (1,), ends blocks in
+    progress early. `failures` are the errors that mean that the executor itself failed.
     """
 
     executor: Executor
@@ -37,7 +37,7 @@ class Crew:
     cancel: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     failures: tuple[type[BaseException], ...] = ()
     broken: bool = False
-    """True once the executor has failed: it then ends blocks in progress, which give no result."""
+    """True once the executor has failed: blocks in progress then end without result."""
 
     def __enter__(self) -> Self:
         return self
@@ -46,10 +46,10 @@ class Crew:
         self.executor.shutdown(wait=True, cancel_futures=True)
 
     def compute(self, jobs: Iterable[tuple[Study, CellBlock]]) -> Iterator[tuple[Study, CellBlock, Columns]]:
-        """Yield the measures of blocks of studies, in the order of completion.
+        """Yield the metrics of blocks of studies, in the order in which the blocks are completed.
 
-        Only as many blocks are in progress as keep the crew busy, so a study of any length streams. Any early end (such
-        as Ctrl-C) cancels them. Raises Overtaken once nobody waits.
+        Only as many blocks are in progress as keep the workers busy, so a study of any length streams. Any early end
+        (such as Ctrl-C) cancels them. Raises Overtaken once nobody waits for the result.
         """
         settings = StudySettings.current()
         self.cancel[0] = 0
@@ -72,7 +72,7 @@ class Crew:
                 wait(flying, timeout=settings.block_timeout)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
-        """Yield the blocks of studies, as large as memory allows, but enough for the whole crew."""
+        """Yield the blocks of studies: as large as memory allows, but enough for all workers."""
         settings = StudySettings.current()
         for study in studies:
             largest = settings.largest_survey_block if study.cycles else settings.largest_memory_block
@@ -80,7 +80,7 @@ class Crew:
             yield from ((study, block) for block in study.blocks(shape))
 
     def _result(self, future: Future[Columns]) -> Columns:
-        """Return a task's result. Raises RuntimeError if the executor fails, and the task's errors."""
+        """Return a task's result. Raises the task's error, or RuntimeError if the executor failed."""
         with self._blamed():
             return future.result()
 
@@ -107,9 +107,10 @@ class _Threads(ThreadPoolExecutor):
 
 
 def local_crew(threads: int | None = None) -> Crew:
-    """Return the threads of this process, by default one per processor, for one block at a time.
+    """Return a crew of this process' threads, which compute one block at a time.
 
-    A second block is prepared, or its results written, meanwhile.
+    `threads` is their number, by default one per processor. Meanwhile a second block is prepared, or its results
+    written.
     """
     stop = np.zeros(1, np.int64)
     arguments = {"threads": threads, "cancel": stop}
@@ -117,7 +118,10 @@ def local_crew(threads: int | None = None) -> Crew:
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
-    """Compute the measures of single cells, given by their numbers in C order."""
+    """Compute the metrics of single cells of a study, by the cells' indices in C order.
+
+    Returns arrays of shape (cells,), in the order of the indices.
+    """
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
     for _, block, columns in crew.compute(crew.jobs([picked])):

@@ -31,7 +31,7 @@ def export(runs: xr.Dataset, path: Path) -> None:
 
 
 def _bytes(texts: np.ndarray) -> np.ndarray:
-    """Return the texts in UTF-8, as long as the longest of them."""
+    """Return texts as UTF-8 bytes, in an array wide enough for the longest of them."""
     import pandas as pd
 
     codes, words = pd.factorize(texts.ravel())
@@ -39,7 +39,7 @@ def _bytes(texts: np.ndarray) -> np.ndarray:
 
 
 def _write_csv(runs: xr.Dataset, path: Path) -> None:
-    """Write runs as a table of comma-separated values."""
+    """Write a study as a table of comma-separated values, one row per cell."""
     settings = StudySettings.current()
     import pandas as pd
 

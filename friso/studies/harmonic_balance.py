@@ -1,4 +1,4 @@
-"""Compare limit cycles by harmonic balance with simulated ones, to show its errors."""
+"""Compare limit cycles from harmonic balance with simulated ones, to show its errors."""
 
 from __future__ import annotations
 
@@ -38,16 +38,20 @@ def harmonic_balance(
     harmonics: Sequence[int] = HARMONICS,
     rtol: float = CYCLE_RTOL,
 ) -> xr.Dataset:
-    """Return the symmetric hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
+    """Compare the symmetric hunting cycle of a stage by simulation and by harmonic balance.
 
-    Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of that cycle, attracting or not, found by shooting
-    (what attracts the stage is another question: see `friso.check`); `solutions`, the
-    number of cycles that single-harmonic balance predicts, and `least_residual`, the least residual of that balance
-    (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic
-    of a multi-harmonic balance (each of `harmonics`) that starts from the simulated cycle: `period_error` and
-    `amplitude_error`, relative, NaN where it does not close on a motion; and `status`. Raises InputError for a
-    stage without friction, one whose controller has no crossover, and one that has no cycle that is its own mirror
-    image.
+    The result is a dataset over "crossover", the `crossovers` [Hz]. Balance with several harmonics is also over
+    "highest", its highest harmonic, which takes each value of `harmonics`.
+
+    - `period` [s], `amplitude` [m] and `multiplier`, over "crossover": the simulated cycle, attracting or not, closed
+      by shooting. What attracts the stage is another question: see `friso.check`.
+    - `solutions` and `least_residual`, over "crossover": the number of cycles that balance with a single harmonic
+      predicts, and the least residual of that balance (see `friso.frequency.describing.balance`).
+    - `period_error` and `amplitude_error`, over both: relative errors of balance with several harmonics, which starts
+      from the simulated cycle. They are NaN where balance does not close on a motion; `status` says so.
+
+    Raises InputError for a stage without friction, one whose controller has no crossover, and one without a cycle that
+    is its own mirror image.
 
     Examples
     --------
@@ -89,7 +93,7 @@ def harmonic_balance(
 
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
-    """Return the symmetric cycle of every stage.
+    """Return the symmetric cycle of every stage, closed as an orbit.
 
     Raises InputError if a stage has none.
     """
@@ -107,9 +111,9 @@ def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
 def _errors(
     stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
 ) -> list[tuple[float, float, str]]:
-    """Return relative errors of period and amplitude of one stage, with a status.
+    """Return errors of period and amplitude of harmonic balance, for stage `number`.
 
-    There is one entry for every highest harmonic.
+    Errors are relative to the simulated cycle. There is one (period, amplitude, status) for every highest harmonic.
     """
     single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES

@@ -16,7 +16,7 @@ from friso.studies.study import Study
 
 
 class KeptCells:
-    """Stored results of cells, in a folder under the study's digest.
+    """Stored results of cells, in a folder, with the digest of their study.
 
     Damaged results, and those of another study, are computed again.
     """
@@ -25,7 +25,10 @@ class KeptCells:
         self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
 
     def keeping(self, ask: Ask) -> Ask:
-        """Return the function `ask`, changed to store its answers."""
+        """Return the function `ask`, changed to store its answers or to take stored ones.
+
+        `ask` computes the metrics of cells from the cells' indices.
+        """
         self.folder.mkdir(exist_ok=True)
         number = count()
 

@@ -1,7 +1,7 @@
-"""Record the digests of the chunks of each block, in a file per block.
+"""Record the digests of the chunks of each block of a store, in a file per block.
 
-The digests include the study, the block and the variable, so exchanged chunks are detected, unlike with checksums
-inside them. The file is written last: a block with a file is complete.
+The digests include the study, the block and the variable. So exchanged chunks are detected, unlike with checksums
+inside the chunks. The file is written last: a block with a file is complete.
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ from friso.studies.store_files import BLOCKS, digest_of, put, stored
 
 @dataclass(frozen=True)
 class Ledger:
-    """The digests of the blocks of a store at `path`, for a study and its metrics."""
+    """The records of the blocks of a store at `path`: digests of their chunks.
+
+    They are for a `study`, by its digest, and its metrics.
+    """
 
     path: Path
     study: str
     metrics: tuple[str, ...]
 
     def has(self, number: str) -> bool:
-        """Tell whether a block is recorded as written."""
+        """Tell whether a block, by its `number` as in Zarr, is recorded as written."""
         return self._file(number).exists()
 
     def entered(self) -> list[str]:
-        """Return the names in the folder of written blocks. Raises OSError."""
+        """Return the numbers of the recorded blocks, as texts, sorted. Raises OSError."""
         return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
 
     def enter(self, number: str) -> None:
@@ -35,7 +38,7 @@ class Ledger:
         put(self._file(number), self._entry(number))
 
     def is_whole(self, number: str) -> bool:
-        """Tell whether all chunks of a block are unchanged.
+        """Tell whether all chunks of a block are unchanged since the block was recorded.
 
         Raises PermissionError if they cannot be read.
         """
@@ -47,9 +50,9 @@ class Ledger:
             return False
 
     def digest(self, number: str, name: str) -> str | None:
-        """Return the recorded digest of a chunk.
+        """Return the recorded digest of a metric's chunk in a block.
 
-        It is None if its block was not recorded, and "" if the record is damaged. Raises PermissionError.
+        It is None if the block was not recorded, and "" if the record is damaged. Raises PermissionError.
         """
         try:
             entry = json.loads(stored(self._file(number)))

@@ -40,9 +40,9 @@ _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
 
 def names(links: Mapping[str, str]) -> frozenset[str]:
-    """Return every name that the expressions of links use.
+    """Return every name of a key or an axis in the expressions of links.
 
-    Raises InputError.
+    Raises InputError for an expression that is not allowed.
     """
     trees = [_parsed(key, text) for key, text in links.items()]
     called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
@@ -58,7 +58,7 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
 def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
     """Check that links lead to keys, and that their expressions use only keys or `axes`.
 
-    Raises InputError.
+    Raises InputError otherwise.
     """
     numeric = stage.numeric_keys()
     for key in links:
@@ -73,7 +73,7 @@ def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) ->
 
 
 def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the SI values of linked keys, from values of keys and axes (numbers or arrays).
+    """Return the SI values of linked keys, from `values` of keys and axes (numbers or arrays).
 
     A link can use the links before it.
     """

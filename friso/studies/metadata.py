@@ -37,9 +37,9 @@ _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w
 """Patterns of metadata files beside the arrays, and of files of axes: the only files that metadata may name."""
 
 _KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"blosc", "crc32"}
-"""Allowed number and text types, with their size, and allowed codecs, which only decode."""
+"""Allowed types of numbers and texts with their size, and allowed codecs, which only decode."""
 _CHUNK = 1 << 30
-"""Largest chunk in memory [bytes]: that of the longest axis."""
+"""Largest chunk in memory [bytes]; a chunk may be a whole axis."""
 
 _EXPECTED = "a store made by friso map, or a new name"
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
@@ -47,10 +47,10 @@ _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
 @dataclass(frozen=True)
 class Metadata:
-    """Metadata of a store.
+    """Metadata of a store of studies.
 
-    They are the contents of Zarr's files beside the arrays, friso's digest of the original study, the SHA-256 of each
-    file of the axes, and notes.
+    `document` has the contents of Zarr's files beside the arrays. Further fields are the digest of the original study,
+    the SHA-256 of each file of the axes, and notes.
     """
 
     document: Mapping[str, Any]
@@ -65,7 +65,7 @@ class Metadata:
 
     @property
     def all_files(self) -> dict[str, Any]:
-        """Return the metadata together with the file that combines them, and its copy."""
+        """Return the contents of all metadata files by path, with the combined file and its copy."""
         return {**self.files, _FILE: self.document, _COPY: self.document}
 
     @property
@@ -78,11 +78,11 @@ class Metadata:
         return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
-        """Return the files of the axes that differ from what was written."""
+        """Return the files of the axes in the store at `path` that differ from what was written."""
         return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
-        """Rewrite metadata files that differ. Raises OSError."""
+        """Rewrite the metadata files of the store at `path` that differ. Raises OSError."""
         for name in self.damaged_files(path):
             if name == _FILE:
                 logger.warning("%s: %s was damaged, and is written anew from its copy", path, name)
@@ -91,9 +91,9 @@ class Metadata:
 
 
 def seal_metadata(path: Path, axes: Iterable[str]) -> None:
-    """Seal the metadata of a new store, with the digests of its `axes`, by name.
+    """Record the digests of the `axes`, by name, in the metadata of a new store at `path`.
 
-    Raises OSError.
+    From then on, changed metadata are detected. Raises OSError.
     """
     document = json.loads(stored(path / _FILE))
     files = [
@@ -107,7 +107,10 @@ def seal_metadata(path: Path, axes: Iterable[str]) -> None:
 def annotate_metadata(
     path: Path, attributes: Mapping[str, Any] | None = None, notes: Mapping[str, Any] | None = None
 ) -> None:
-    """Add attributes of the study, and friso's notes. Raises StoreError, OSError."""
+    """Add attributes of the study, and friso's notes, to the metadata of the store at `path`.
+
+    Raises StoreError, OSError.
+    """
     metadata = checked_metadata(path)
     if attributes:
         files = {**metadata.files, _ATTRIBUTES: {**metadata.attributes, **attributes}}
@@ -124,14 +127,14 @@ def _write(path: Path, metadata: Metadata) -> None:
 
 
 def _text(content: Any) -> bytes:
-    """Return the bytes of a metadata file."""
+    """Return JSON content as the bytes of a metadata file."""
     return json.dumps(content, indent=1, sort_keys=True).encode()
 
 
 def checked_metadata(path: Path) -> Metadata:
     """Return the metadata of the store at `path`, after checking them.
 
-    Raises StoreError if there is no store, or it is damaged or of another version.
+    Raises StoreError if there is no store, or if it is damaged or of another version.
     """
     if not path.exists():
         raise StoreError("", "nothing there", _EXPECTED, _EXAMPLE, str(path))
@@ -150,7 +153,7 @@ class _DamagedError(StoreError):
 
 
 def _metadata_in(path: Path, file: str) -> Metadata:
-    """Read the metadata in this file of the store at `path`. Raises StoreError."""
+    """Read the metadata in one `file` of the store at `path`. Raises StoreError."""
     try:
         document = json.loads(stored(path / file))
         entry, metadata = document.get(_OWN), document["metadata"]
@@ -189,7 +192,7 @@ _WORDS = (b'"equations"', f'"{_OWN}"'.encode())
 
 
 def is_store(path: Path) -> bool:
-    """Tell whether friso made the folder, by its metadata, damaged or not."""
+    """Tell whether friso made the folder, by its metadata files, damaged or not."""
     return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _COPY, _ATTRIBUTES))
 
 
@@ -205,7 +208,7 @@ def _says(file: Path, content: Any) -> bool:
 
 
 def _mentions(file: Path, words: bytes) -> bool:
-    """Tell whether a file contains some words."""
+    """Tell whether a file can be read and contains these words."""
     try:
         return words in stored(file)
     except OSError:
@@ -213,10 +216,10 @@ def _mentions(file: Path, words: bytes) -> bool:
 
 
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
-    """Tell whether the files named by metadata are possible in a store.
+    """Tell whether all files that metadata name may belong to a store.
 
-    No file may lie outside. Arrays must be numbers or texts as friso writes them, because other codecs may run code.
-    Each axis must be complete.
+    No file may lie outside the store. Arrays must be numbers or texts as friso writes them, because other codecs may
+    run code. Each axis must be complete.
     """
     if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
         return False
@@ -239,7 +242,10 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
 
 
 def _is_plain(array: Mapping[str, Any]) -> bool:
-    """Tell whether an array has numbers or texts, compressed and sized as friso writes them."""
+    """Tell whether an array has numbers or texts, compressed and sized as friso writes them.
+
+    `array` is Zarr's description of it.
+    """
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
     laid_out = (array["order"], array.get("dimension_separator", "."))
@@ -250,7 +256,7 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
 
 
 def _chunks(array: Mapping[str, Any]) -> int:
-    """Return the number of chunks of an array."""
+    """Return the number of chunks of an array, from Zarr's description of it."""
     return math.prod(-(-length // size) for length, size in zip(array["shape"], array["chunks"], strict=True))
 
 
@@ -260,5 +266,5 @@ def _damaged(path: Path, damage: str) -> _DamagedError:
 
 
 def digest(content: Any) -> str:
-    """Return the SHA-256 of a JSON value."""
+    """Return the SHA-256 of a JSON value, as hexadecimal digits."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

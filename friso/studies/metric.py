@@ -27,7 +27,7 @@ MetricBasis = Literal["run", "sketch", "survey"]
 
 @dataclass(frozen=True)
 class RunEvidence:
-    """Runs of cells: the flat keys of their stages, the simulated runs, and their measures."""
+    """Runs of cells: the keys of their stages with SI values, the runs, and their measures."""
 
     flat: Mapping[str, Any]
     runs: Runs
@@ -36,7 +36,7 @@ class RunEvidence:
 
 @dataclass(frozen=True)
 class StageEvidence:
-    """Evidence on the stages of cells: flat keys, attractors and motions.
+    """What is known of the stages of cells: keys with SI values, attractors and motions.
 
     The function `verdicts` runs further simulations, and returns a word for each stage.
     """
@@ -49,11 +49,11 @@ class StageEvidence:
 
 @dataclass(frozen=True)
 class Word:
-    """A word that a cell can have.
+    """A word that a cell of a map can have.
 
-    It has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label in legends if that is longer.
-    A paler colour marks cells whose word was inferred. Words that are verbs stand in the third person ("swings"), for
-    sentences that count cells.
+    It has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is longer.
+    `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand in the
+    third person ("swings"), for sentences that count cells.
     """
 
     text: str
@@ -65,7 +65,7 @@ class Word:
 
 @dataclass(frozen=True)
 class MapFinding:
-    """A statement on a map: which fraction of cells has one of the `words`, and where they lie.
+    """A statement on a map: which fraction of its cells has one of the `words`, and where.
 
     For counts, it is the fraction of cells above 0. With `if_any` the statement is left out if no cell has the word.
     """
@@ -77,7 +77,7 @@ class MapFinding:
 
 @dataclass(frozen=True)
 class Metric:
-    """A quantity or word of every cell of a map.
+    """A quantity or word that every cell of a map has.
 
     Parameters
     ----------
@@ -86,23 +86,23 @@ class Metric:
     compute : callable
         Returns one entry per cell, from `RunEvidence` (source "run") or `StageEvidence`.
     source : str
-        What it is computed from.
+        What it is computed from: the cell's run, or a sketch or full survey of what attracts its stage.
     unit : str
         SI unit of numbers, "1" of counts; "" of words.
     words : tuple of Word
         The words that a cell can have, the worst first; none for numbers.
     usual : bool
-        Whether it is computed along with every other metric of its source, since that costs next to nothing.
+        Whether it is computed along with any other metric of its source, since that costs next to nothing.
     place : int
-        Its place among the variables of a study: lower numbers come first.
+        Number that orders the variables of a study: lower numbers come first.
     criterion : str
-        The criterion by which it decides, stored with the numbers.
+        The criterion by which the value is decided, stored with the values.
     band : float, optional
-        The deviation [m] that it looks at, stored with the numbers.
+        The deviation [m] that counts as at rest or settled, stored with the values.
     missing : str
         Why a cell that was run has no number.
     reasons : str
-        The metric whose words say why a cell has no number, computed beside this one.
+        Name of the metric whose words say why a cell has no number, computed beside this one.
     limits : tuple, optional
         Ends of the colour scale; from the data otherwise.
     counts : bool
@@ -110,15 +110,15 @@ class Metric:
     verdict : bool
         Whether the words are verdicts of `friso.hunting.criteria`: maps then show the edge of hunting.
     basis : str
-        What the verdict on the user's own stage is qualified by.
+        Words added to the verdict on the user's own stage, such as "by this sketch".
     findings : tuple of MapFinding
-        What the sentences on a map state; none: those of `answered_by`.
+        Statements on a map about this metric; none: those of `answered_by`.
     doubt : tuple
-        A word, and a sentence about its cells, with {count} and {share} of the map.
+        A word, and a sentence about the cells with this word, with {count} and {share} of the map.
     answered_by : str
-        The metric whose findings are stated where this one has none.
+        Name of the metric whose statements are used where this one has none.
     shown_as : str
-        The metric of the stage that a map shows where this one of a run is asked for.
+        Name of the metric of the stage that a map shows if this metric of a run is asked for.
     tallied : bool
         Whether sentences and tables count the cells of every word.
     """
@@ -146,24 +146,30 @@ class Metric:
 
     @property
     def form(self) -> str:
-        """Return the NumPy type in which the metric is stored.
+        """Return the NumPy type in which the metric's values are stored.
 
         Words have room for "invalid" and all words of friso.
         """
         return f"<U{max(9, *(len(word.text) for word in self.words))}" if self.words else "f8"
 
     def attributes(self, kind: AxisKind) -> dict[str, Any]:
-        """Return the attributes of the metric's variable, for stages with that kind of axis."""
+        """Return unit, band and criterion of the metric, as attributes of a study's variable.
+
+        `kind` is the kind of axis of the stages.
+        """
         attributes: dict[str, Any] = {} if self.words else {"units": kind.unit(self.unit)}
         attributes |= {} if self.band is None else {kind.suffix("band_m"): self.band}
         return attributes | ({"criterion": kind.text(self.criterion)} if self.criterion else {})
 
 
 METRICS: Registry[Metric] = Registry("friso.studies.metrics", "METRIC", "friso.metrics", Metric, dashes=False)
-"""All metrics, by name."""
+"""All metrics of maps, by name."""
 
 STATUS, STATUS_FORM = "status", "<U160"
-"""Name and type of the variable with the status of every cell: completed, or why not; longer texts are cut."""
+"""Name and type of a study's variable with the status of every cell.
+
+It is completed, or why not; longer texts are cut.
+"""
 
 
 def metrics() -> dict[str, Metric]:
@@ -177,7 +183,7 @@ def usual_metrics() -> tuple[str, ...]:
 
 
 def with_usual(metric: str) -> tuple[str, ...]:
-    """Return the variables of a study for a map of a metric.
+    """Return the variables of a study for a map of one metric.
 
     All metrics that cost nothing beside it are included.
     """
@@ -188,7 +194,7 @@ def with_usual(metric: str) -> tuple[str, ...]:
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Sort variables as studies hold them.
+    """Sort names of variables as studies hold them, without repetitions.
 
     Outcome, status and the reasons for missing numbers are added.
     """
@@ -208,7 +214,10 @@ def every_variable() -> tuple[str, ...]:
 
 
 def attributes_of(variable: str, kind: AxisKind) -> dict[str, Any]:
-    """Return the attributes of a variable of a study, for stages with that kind of axis."""
+    """Return unit, band and criterion of a study's variable, as its attributes.
+
+    `kind` is the kind of axis of the stages.
+    """
     return {} if variable == STATUS else metrics()[variable].attributes(kind)
 
 
@@ -218,6 +227,6 @@ def is_text(variable: str) -> bool:
 
 
 def worded(verdicts: bool = False) -> list[str]:
-    """List the metrics with words; with `verdicts`, only the outcome and the verdicts."""
+    """Return the metrics with words; with `verdicts`, only the outcome and the verdicts."""
     every = metrics().items()
     return [name for name, one in every if one.words and (one.verdict or name == "outcome" or not verdicts)]

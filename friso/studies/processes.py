@@ -26,12 +26,12 @@ from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 
 _cancel = np.zeros(1, np.int64)
-"""Flag that ends the block of this process early. In a worker it is memory shared with the parent."""
+"""Flag, (1,), that ends this process' block early; a worker shares it with its parent."""
 
 
 @contextmanager
 def processes(workers: int) -> Iterator[Crew]:
-    """Return a crew of worker processes on this machine.
+    """Yield a crew of `workers`: separate processes on this machine.
 
     Each computes one block at a time, in one thread. The workers end with this process, however it ends.
     """
@@ -66,12 +66,12 @@ _SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def run_block(*arguments: Any) -> Columns:
-    """Run `run_cells` in a worker, until it is done or the crew cancels it."""
+    """Compute a block's metrics with `run_cells` in a worker, until done or cancelled."""
     return run_cells(*arguments, cancel=_cancel)
 
 
 def _prepare(shared: Any, cache: Path) -> None:
-    """Make this process a worker.
+    """Make this process a worker of its parent.
 
     Ctrl-C is left to the parent process, and the worker ends with its parent. It uses the parent's cache of kernels,
     even a temporary one.

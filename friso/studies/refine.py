@@ -1,7 +1,7 @@
-"""Sample adaptively: a grid four times finer per axis, for a fifth of its runs.
+"""Sample a map adaptively: a grid four times finer per axis, for a fifth of its runs.
 
-A lattice of every second cell of the given grid is run first. Where neighbouring cells differ, both are run, until
-every change of outcome (or of verdict, if computed) has been seen from both sides; so a boundary that was met once is
+A lattice of every second cell of the user's grid is run first. Where neighbouring cells differ, both are run, until
+every change of outcome (or of verdict, if computed) has been seen from both sides. So a boundary that was met once is
 followed to its end. Remaining runs go to the most uncertain cells: far from any run, near boundaries, and where runs
 settle late.
 """
@@ -25,11 +25,14 @@ from friso.studies.settings import StudySettings
 from friso.studies.study import Dimension, Study
 
 Ask = Callable[[np.ndarray], Columns]
-"""Function that returns the measures of numbered cells."""
+"""Function that returns the metrics of cells, by the cells' indices."""
 
 
 def finer(study: Study) -> Study:
-    """Return the study on the fine grid. Raises InputError if there is no such grid."""
+    """Return the study on a grid four times finer per axis.
+
+    Raises InputError unless it has one to three axes of numbers, on a grid.
+    """
     if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
         expected = "one to three axes of numbers on a grid"
         raise InputError("--refine", f"axes: {', '.join(study.names)}", expected)
@@ -38,7 +41,7 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """Return the axis with cells in between, as if a range had been given with that many points."""
+    """Return the axis with values in between, as if the user had asked for that many."""
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -53,15 +56,15 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
 
 def asked_for(study: Study) -> Study:
-    """Return the study with the variables needed to refine it."""
+    """Return the study with the further metrics that its refinement needs."""
     return replace(study, metrics=in_order((*usual_metrics(), *study.metrics)))
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:
-    """Compute a fine study from some of its cells; return measures, each of shape (cells,).
+    """Compute a fine study from some of its cells; return its metrics, each of shape (cells,).
 
-    A cell that was not computed has the outcome (and the verdict) of the nearest computed one, a status that says so,
-    and no numbers.
+    `ask` computes the metrics of cells. A cell that was not computed has the outcome (and the verdict) of the nearest
+    computed one, a status that says so, and no numbers.
     """
     settings = StudySettings.current()
     grid = _Grid(study)
@@ -79,14 +82,14 @@ def refine_cells(study: Study, ask: Ask) -> Columns:
 
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
-    """Return the numbers of the cells of the coarse lattice, including the ends of the axes."""
+    """Return the indices of the cells of a coarse lattice, including the ends of the axes."""
     settings = StudySettings.current()
     lines = [np.unique(np.append(np.arange(0, size, settings.lattice_step), size - 1)) for size in shape]
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
 
 
 class _Grid:
-    """Results of the computed cells of a study, on a grid that is refined."""
+    """Results of the computed cells of a study on a fine grid, and which cells to compute next."""
 
     def __init__(self, study: Study) -> None:
         settings = StudySettings.current()
@@ -99,7 +102,7 @@ class _Grid:
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
-        """Compute cells, and store their results.
+        """Compute cells with `ask`, and store their results.
 
         Invalid cells do not count as runs.
         """
@@ -110,7 +113,7 @@ class _Grid:
         self.runs += int(np.sum(columns["outcome"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distance to the nearest computed cell, and the number of that cell.
+        """Return the distance in cells to the nearest computed cell, and that cell's index.
 
         Both have the study's shape.
         """
@@ -121,9 +124,9 @@ class _Grid:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Return which cells have a neighbour with other words.
+        """Return which cells have a neighbour with another outcome or verdict.
 
-        A cell counts with the words of the nearest computed cell.
+        A cell has the words of its nearest computed cell, `nearest`.
         """
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
@@ -136,12 +139,15 @@ class _Grid:
         return changes
 
     def unseen_changes(self) -> np.ndarray:
-        """Return the numbers of cells at a change of words that are not computed yet."""
+        """Return the indices of cells at a change of outcome or verdict that are not computed yet."""
         _, nearest = self._nearest()
         return np.flatnonzero(self._changes(nearest) & ~self.computed)
 
     def likely_surprises(self, count: int) -> np.ndarray:
-        """Return the numbers of the cells, at most `count`, that are most worth a run."""
+        """Return the indices of the cells, at most `count`, that are most worth a run.
+
+        These are far from any computed cell, near changes, and where runs settle late.
+        """
         settings = StudySettings.current()
         from scipy.ndimage import distance_transform_edt
 
@@ -155,7 +161,10 @@ class _Grid:
         return best[worth.flat[best] > 0]
 
     def filled(self) -> Columns:
-        """Return the measures of all cells, with inferred ones for cells not computed."""
+        """Return the metrics of all cells; a cell not computed has the words of the nearest one.
+
+        Its status says so.
+        """
         _, nearest = self._nearest()
         guessed = ~self.computed.ravel()
         words = {name: self.columns[name][nearest.ravel()] for name in self.words}

@@ -23,7 +23,7 @@ TRIED = 512
 
 @dataclass(frozen=True)
 class Request:
-    """A stage, what is varied in it, and links, as the user gives them (see `friso.sweep`).
+    """A stage, its varied keys, and links, as the user's texts and arrays (see `friso.sweep`).
 
     With `log`, ranges that do not state their spacing are logarithmic.
     """
@@ -38,17 +38,17 @@ class Request:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:
-        """Return the number of cells, without making any array.
+        """Return the number of cells of the study, without making any array.
 
-        Raises InputError as `study` does.
+        Raises InputError for an axis that the study could not have.
         """
         samples = 1 if self.samples is None or self.samples.count is None else self.samples.count
         return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
 
     def trial(self) -> Study:
-        """Return a few cells drawn evenly from a study that may be too large to be made.
+        """Return a study of a few cells drawn evenly from one that may be too large to be made.
 
-        Raises InputError.
+        Raises InputError for an axis that the stage cannot have.
         """
         rng = np.random.default_rng(0)
         axes = []
@@ -60,7 +60,10 @@ class Request:
         return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), usual_metrics(), 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
-        """Return the study. Raises InputError."""
+        """Return the study of these axes with some metrics, by default the usual ones.
+
+        Raises InputError for wrong axes, links, metrics or tolerance.
+        """
         checked_rtol(rtol)
         read = self._read(self.axes)
         if not read and self.samples is None:
@@ -97,9 +100,9 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
 
 
 def _checked_metrics(names: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the requested variables, by default the usual ones, in their usual order.
+    """Return a study's requested variables, by default the usual ones, in their usual order.
 
-    Raises InputError.
+    Raises InputError for an unknown name.
     """
     for name in names or ():
         if name not in every_variable():

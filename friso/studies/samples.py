@@ -1,4 +1,4 @@
-"""Draw samples of several keys at once: Sobol points and Latin hypercubes.
+"""Draw samples of several keys at once as Sobol points or Latin hypercubes.
 
 They come from `scipy.stats.qmc`.
 """
@@ -64,7 +64,11 @@ class Samples:
 
 
 def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
-    """Return the sampled axes, all of one length. Raises InputError."""
+    """Return the axes of samples, all of one length, from ranges or from lists.
+
+    `free` are names that links use, and `log` makes ranges logarithmic. Raises InputError for ranges with a number of
+    points, for lists of unequal length, and for ranges together with lists.
+    """
     read = read_axes(stage, samples.ranges, free, log)
     ranges = [axis for axis in read if isinstance(axis, SweptRange)]
     if not ranges:
@@ -87,7 +91,10 @@ def _values(read: tuple[SweptAxis | SweptRange, ...]) -> tuple[SweptAxis, ...]:
 
 
 def _points(dimensions: int, samples: Samples) -> np.ndarray:
-    """Return points of the unit cube, shape (count, dimensions)."""
+    """Return points in the unit cube, shape (count, dimensions).
+
+    Raises InputError if the samples have no count.
+    """
     from scipy.stats import qmc
 
     if samples.count is None:

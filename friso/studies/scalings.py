@@ -17,7 +17,11 @@ from friso.studies.links import names
 
 @dataclass(frozen=True)
 class Scaling:
-    """Axis of factors: its words, the scaling, and the table that a stage needs for it."""
+    """Axis of factors on several keys, such as the speed of the controller.
+
+    It has `words` for figures and the function that multiplies the keys. `needs` is a key that a stage must have for
+    it.
+    """
 
     words: str
     scaled: Callable[[Mapping[str, Any], Any], dict[str, Any]]
@@ -28,15 +32,17 @@ SCALINGS = {
     "speed": Scaling("Controller speed (times yours)", faster, KIND),
     "friction": Scaling("Friction (times yours)", with_friction, "friction.model"),
 }
-"""All scalings by the name of their axis. Factors apply to all poles and zeros of the controller, or to every friction
-force."""
+"""All axes of factors, by name.
+
+Factors apply to all poles and zeros of the controller, or to every friction force.
+"""
 
 
 def scaled(flat: Mapping[str, Any], columns: Mapping[str, np.ndarray], links: Mapping[str, str]) -> dict[str, Any]:
-    """Return stages multiplied by the scaling factors among the columns.
+    """Return keys of stages, multiplied by the scaling factors among the columns.
 
-    The stages are flat keys; a name that links use is a free variable. Raises InputError if a stage has nothing to
-    scale.
+    `flat` has SI numbers or arrays (cells,) by key. A name that links use is a free variable, not a scaling. Raises
+    InputError if a stage has nothing to scale.
     """
     for name, scaling in SCALINGS.items():
         if name in columns and name not in names(links):

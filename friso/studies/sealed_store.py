@@ -1,4 +1,4 @@
-"""Give Zarr a store whose metadata and chunks are checked.
+"""Give Zarr a store of studies whose metadata and chunks are checked as they are read.
 
 The module imports zarr, which takes 0.4 s.
 """
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class SealedStore(WrapperStore[LocalStore]):
     """A store whose metadata come from `metadata`, whatever its files contain.
 
-    Some versions of Zarr read the files one by one, others the combined one. Chunks must be those recorded for
-    completed blocks.
+    Some versions of Zarr read the metadata files one by one, others the combined file. Chunks must be those recorded
+    for completed blocks.
     """
 
     def __init__(self, store: LocalStore, metadata: Metadata) -> None:
@@ -39,14 +39,14 @@ class SealedStore(WrapperStore[LocalStore]):
 
     @classmethod
     def at(cls, path: Path, metadata: Metadata) -> SealedStore:
-        """Return the store at `path`, for reading only."""
+        """Return the store in the folder `path`, for reading only."""
         return cls(LocalStore(path, read_only=True), metadata)
 
     def _with_store(self, store: LocalStore) -> SealedStore:
         return type(self)(store, self.metadata)
 
     def with_read_only(self, read_only: bool = False) -> SealedStore:
-        """Return the store, read-only or writable.
+        """Return the store as a read-only or writable one.
 
         Zarr before 3.1.6 lacks this for such a store.
         """
@@ -68,7 +68,10 @@ class SealedStore(WrapperStore[LocalStore]):
         return chunk
 
     def _unread(self, variable: str, number: str, problem: str) -> StoreError:
-        """Return the error for cells of a variable that are damaged or unreadable."""
+        """Return the error for a chunk of a variable that is damaged or unreadable.
+
+        `number` is the chunk's name in Zarr, and `problem` says what is wrong with it.
+        """
         array, names = (self.files[f"{variable}/{name}"] for name in (".zarray", ".zattrs"))
         cells = ", ".join(
             f"{int(part) * size}:{min((int(part) + 1) * size, length)}"

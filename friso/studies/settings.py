@@ -24,25 +24,27 @@ class StudySettings(Settings):
     """Time within which a scheduler on a busy network answers."""
 
     timed_runs: int = setting(64, "")
-    """Runs that are timed. Fewer measure the start of the threads rather than the solver."""
+    """Runs that `friso doctor` times. Fewer measure the start of the threads, not the solver."""
 
     expected_swing: float = setting(1.03e-3, "m")
     """Hunting amplitude of the template's stage with its joint locked (docs/hunting.md)."""
 
     swing_error: float = setting(0.02, "")
-    """Largest relative error of that swing. Processors agree to a thousandth; a broken kernel is off by far more."""
+    """Largest relative error of the expected amplitude. Processors agree to a thousandth; a broken kernel is off by far
+    more."""
 
     stages_together: int = setting(256, "")
-    """Stages computed between progress reports. Fewer leave lanes idle."""
+    """Stages computed between progress reports. Fewer do not fill the processor's registers."""
 
     trial_draws: int = setting(16, "")
     """Draws that are timed first. Fewer are misled by a single slow one."""
 
     usual_draws: int = setting(256, "")
-    """Default draws, which give a fraction to five percent. More make a check wait."""
+    """Default draws. They give a fraction to five percent; more make a check wait."""
 
     usual_work: float = setting(3e8, "")
-    """Work of a check without a requested number of draws, about 4 s on one core."""
+    """Work of a check without a requested number of draws (see `friso.engine.allowance`). It takes about 4 s on one
+    core."""
 
     draws_of_a_swing: int = setting(64, "")
     """Draws whose amplitude and period are reported. A range of fewer leaves a tenth of the machines out."""
@@ -54,16 +56,17 @@ class StudySettings(Settings):
     """Bandwidths tried for each edge. Fewer give a coarser edge."""
 
     reach_of_an_edge: float = setting(1.6, "")
-    """Factor about the stage's own edge over which these bandwidths lie."""
+    """Factor about the stage's own edge of hunting over which bandwidths are tried."""
 
     most_draws: int = setting(100_000, "")
     """Most draws. At the edge of hunting a draw takes 50 ms, so more take hours."""
 
     largest_memory_block: int = setting(2048, "")
-    """Largest block in memory, enough to keep all lanes busy nearly to its end."""
+    """Largest block in memory [cells]. It fills the processor's registers nearly to its end."""
 
     largest_survey_block: int = setting(256, "")
-    """Largest block of a survey, which needs a hundred runs for each cell. Larger ones report progress too rarely."""
+    """Largest block of a survey [cells], which needs a hundred runs for each cell. Larger ones report progress too
+    rarely."""
 
     look_interval: float = setting(0.05, "s")
     """Interval between checks for cancellation. Longer ones are felt after Ctrl-C."""
@@ -78,37 +81,38 @@ class StudySettings(Settings):
     """Most knots of a virgin curve, more bends than a measurement can show."""
 
     knot_distance: float = setting(1e-6, "")
-    """Distance of knots, relative to the last one, below which they are one."""
+    """Distance of knots of a virgin curve below which they are one, relative to the last knot."""
 
     rounded_points: float = setting(1e-6, "")
-    """Rounding error of points in files, relative to the end."""
+    """Rounding error of measured forces in files, relative to the force at the end."""
 
     end_weight: float = setting(1e4, "")
-    """Weight with which the curve is tied to its end. A smaller one lets noise decide."""
+    """Weight with which a virgin curve is tied to its end. A smaller one lets noise decide."""
 
     blurred_scatters: float = setting(10.0, "")
-    """Range about 0, in scatters, within which the curve cannot be seen to bend."""
+    """Range about 0, in units of the scatter of x, within which a curve cannot be seen to bend."""
 
     least_noise: float = setting(0.01, "")
-    """Least noise, relative to the end, assumed if points are too few to show their noise."""
+    """Least noise, relative to the end of a curve, assumed if points are too few to show it."""
 
     fit_steps: int = setting(10_000, "")
-    """Most steps of a fit. One that needs more does not converge."""
+    """Most steps of a fit of a virgin curve. One that needs more does not converge."""
 
     hopeless_criterion: float = setting(100.0, "")
-    """Excess of the criterion from which fits with as many knots cannot become the best."""
+    """Excess of Akaike's criterion over the best from which no further knots are left out."""
 
     least_points: int = setting(3, "")
-    """Fewest points; two are a line."""
+    """Fewest points of a virgin curve; two are a line."""
 
     most_points: int = setting(100_000, "")
-    """Most points. More take seconds and improve nothing."""
+    """Most points of a virgin curve. More take seconds and improve nothing."""
 
     reached_friction: float = setting(0.9, "")
     """Friction that a curve must reach, relative to static friction, to show break-away."""
 
     late_points: int = setting(20, "")
-    """Share of points, one in so many, that must reach that friction, so that a single outlier does not count."""
+    """Share of points, one in so many, whose mean must nearly reach static friction. A single outlier then does not
+    count."""
 
     backward_share: float = setting(0.01, "")
     """Largest backward displacement that is noise, not a turn."""
@@ -117,13 +121,13 @@ class StudySettings(Settings):
     """Largest difference of virgin curves that a measurement cannot resolve."""
 
     number_gain: int = setting(4, "")
-    """Penalty of a free number, twice as large as in Akaike's criterion."""
+    """Penalty for each free number of a fit, twice as large as in Akaike's criterion."""
 
     likely_difference: float = setting(8.0, "")
     """Difference of Akaike's criterion below which fits are as likely as the best."""
 
     slope_errors: float = setting(3.0, "")
-    """Standard errors of the initial slope within which fits agree."""
+    """Range of the initial slope within which fits agree, in its standard errors."""
 
     first_friction: float = setting(1 / 3, "")
     """Largest force of the first point, over static friction, that shows the initial stiffness."""
@@ -132,25 +136,26 @@ class StudySettings(Settings):
     """Refinement of a boundary per axis. Eight would take most of the runs."""
 
     refined_share: float = setting(0.2, "")
-    """Fraction of the fine grid that is run. Fewer runs may step over small islands."""
+    """Fraction of the fine grid of a map that is run. Fewer runs may step over small islands."""
 
     lattice_step: int = setting(8, "")
-    """Spacing of the first runs in the fine grid. A smaller one leaves fewer runs for the boundary."""
+    """Spacing of the first runs in the fine grid [cells]. A smaller one leaves fewer runs for the boundary."""
 
     refine_batches: int = setting(100, "")
-    """Batches of runs, each chosen after the results of the last. More wait for their slowest cell."""
+    """Batches of runs of a refined map, each chosen after the results of the one before. More wait for their slowest
+    cell."""
 
     late_settling: float = setting(10.0, "s")
     """Time after which the thesis counts peaks. A run that settles so late counts as swinging."""
 
     least_blocks: int = setting(8, "")
-    """Fewest blocks, so that an interruption loses an eighth of a study at most."""
+    """Fewest blocks of a store, so that an interruption loses an eighth of a study at most."""
 
     usual_blocks: int = setting(250, "")
-    """Usual most blocks. With more, writing delays the workers."""
+    """Usual most blocks of a store. With more, writing delays the workers."""
 
     largest_stored_block: int = setting(16384, "")
-    """Largest stored block. A larger one is read whole for a single cell."""
+    """Largest block of a store [cells]. A larger one is read whole for a single cell."""
 
     stored_block: int = setting(1024, "")
     """Cells of a block in a study with at most the usual number of blocks."""
@@ -159,7 +164,7 @@ class StudySettings(Settings):
     """Cells of a block with surveys of a hundred runs each, so that an interruption costs seconds."""
 
     trace_bins: int = setting(150, "")
-    """Points of a drawn line, a few hundred pixels wide."""
+    """Points of a drawn line of a run, a few hundred pixels wide."""
 
     samples_per_bin: int = setting(20, "")
     """Samples per drawn point. Fewer miss the extremes of fast motion."""
@@ -168,7 +173,7 @@ class StudySettings(Settings):
     """Traces computed together, some tens of megabytes."""
 
     tighter_factor: float = setting(100.0, "")
-    """Factor to the tighter tolerance of verification. A smaller one leaves similar errors in both runs."""
+    """Factor by which verification tightens the tolerance. A smaller one leaves similar errors in both runs."""
 
     least_verified: int = setting(50, "")
     """Fewest verified cells for a meaningful fraction."""
@@ -197,7 +202,7 @@ class StudySettings(Settings):
     slip."""
 
     loop_error: float = setting(0.05, "")
-    """Relative difference of areas or stiffnesses that a log hardly shows."""
+    """Relative difference of loop areas or stiffnesses that a log hardly shows."""
 
     needed_bandwidths: int = setting(48, "")
     """Bandwidths at which a controller alone is tried: 5 % apart over a factor of ten."""

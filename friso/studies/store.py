@@ -1,7 +1,7 @@
-"""Store a study on disk: a Zarr store that is written block by block and can be resumed.
+"""Store a study on disk, in a Zarr store that is written block by block and can be resumed.
 
 The store is made complete, without results, elsewhere and then moved into place. A block is done once its digests are
-recorded (`friso.studies.ledger`), after its chunks were written, each moved into place by Zarr; a block whose chunks
+recorded (`friso.studies.ledger`), after its chunks were written, each moved into place by Zarr. A block whose chunks
 differ from the record is run again.
 """
 
@@ -59,7 +59,7 @@ COORDINATES = "coordinates"
 
 
 class Store:
-    """Results of a study in a folder, which is locked by this process while open."""
+    """The store of a study in a folder at `path`, locked by this process while open."""
 
     def __init__(self, path: Path, study: Study) -> None:
         settings = StudySettings.current()
@@ -74,10 +74,10 @@ class Store:
     @classmethod
     @contextmanager
     def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
-        """Return the store of a study, created if it is not there.
+        """Open the store of a study, created if it is not there.
 
-        With `overwrite` it replaces the store of another study, or a damaged one. Raises StoreError if the folder
-        holds anything else, another study, or is in use by another process.
+        With `overwrite` it replaces the store of another study, or a damaged one. Raises StoreError if the folder holds
+        anything else or another study, or is in use by another process.
         """
         remove_leftovers(path)
         path = where_links_lead(path)
@@ -96,7 +96,7 @@ class Store:
             yield store
 
     def _replace(self) -> None:
-        """Replace the present store by this study, unless the store is this study's already."""
+        """Replace the present store by one of this study, unless it already is this study's."""
         with lock_store(self.path) as lock:
             try:
                 refuse_other(self.path, self.study)
@@ -150,11 +150,11 @@ class Store:
 
     @property
     def ledger(self) -> Ledger:
-        """Return the record of the blocks written."""
+        """Return the records of the blocks that were written."""
         return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
     def missing(self) -> Iterator[CellBlock]:
-        """Yield the blocks that are not done, and damaged ones with a log message."""
+        """Yield the blocks that must be run: those not done, and damaged ones with a log message."""
         ledger = self.ledger
         for block in self.study.blocks(self.blocks):
             number = self._number(block)
@@ -165,7 +165,7 @@ class Store:
                 yield block
 
     def done(self) -> list[str]:
-        """Return the names of the completed blocks.
+        """Return the names of the completed blocks, as in Zarr.
 
         They are read from existing files, because a store may claim any size.
         """
@@ -173,11 +173,11 @@ class Store:
 
     @property
     def is_done(self) -> bool:
-        """Tell whether all blocks are recorded as done."""
+        """Tell whether all blocks are recorded as written."""
         return len(self.done()) == self._count
 
     def state(self) -> StoreState:
-        """Return how far the study is done, and its damaged and unreadable parts."""
+        """Return how much of the study is done, and which of its parts are damaged or unreadable."""
         ledger, done = self.ledger, self.done()
         damaged: list[str] = []
         unreadable: list[str] = []
@@ -200,7 +200,7 @@ class Store:
         return math.prod(self._counts)
 
     def _is_of_block(self, number: str) -> bool:
-        """Tell whether a name is a valid name of a block's files."""
+        """Tell whether a name, such as "0.3", is one of a block of this study."""
         parts = number.split(".")
         return len(parts) == len(self._counts) and all(
             re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
@@ -208,11 +208,14 @@ class Store:
         )
 
     def _number(self, block: CellBlock) -> str:
-        """Return the name of a block's files."""
+        """Return the name of a block's files, such as "0.3"."""
         return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
 
     def write(self, block: CellBlock, columns: Mapping[str, np.ndarray]) -> None:
-        """Write the measures of a block and record it. Raises OSError if the disk is full."""
+        """Write the metrics of a block, and record it. Raises OSError if the disk is full.
+
+        `columns` are arrays of shape (cells,) by name.
+        """
         import zarr
 
         shape = tuple(part.stop - part.start for part in block)
@@ -226,11 +229,11 @@ class Store:
 
     @property
     def answers(self) -> KeptCells:
-        """Return the stored results of cells of an unfinished refined study."""
+        """Return the results of cells that were stored for a refined study before it was finished."""
         return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
-        """Add attributes to the study."""
+        """Add attributes to the stored study."""
         annotate_metadata(self.path, attributes)
 
     @property
@@ -239,20 +242,20 @@ class Store:
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
-        """Add a note on the store that is no part of the study."""
+        """Add friso's own notes to the store, by name, which are no part of the study."""
         annotate_metadata(self.path, notes=notes)
 
     def read(self) -> xr.Dataset:
-        """Return the store as a dataset whose values are read on access."""
+        """Return the study in the store as a dataset whose values are read on access."""
         return read_store(self.path)
 
 
 @check_arguments
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
-    """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
+    """Return the study in the store at `path` as a dataset whose values are read on access.
 
-    Cells that were not run yet are empty. Raises StoreError if there is none, its metadata or axes are damaged, or
-    anything but files is in it, and where damaged cells are looked at.
+    The study may be unfinished; cells that were not run yet are empty. Raises StoreError if there is no store, if its
+    metadata or axes are damaged, or if anything but files is in it. It is also raised on access to damaged cells.
 
     Examples
     --------
@@ -288,7 +291,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 class StoreState:
     """State of a study's store.
 
-    It has the number of blocks, how many are done, and the numbers of damaged blocks. It also lists damaged files of
+    It has the number of blocks, how many are done, and the names of damaged blocks. It also lists damaged files of
     metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
     """
 
@@ -300,12 +303,12 @@ class StoreState:
 
     @property
     def is_whole(self) -> bool:
-        """Tell whether all blocks are done and can be read."""
+        """Tell whether all blocks are done, undamaged and readable."""
         return self.done == self.blocks and not (self.damaged or self.unreadable)
 
 
 def check_store(path: Path) -> StoreState:
-    """Read all of the store at `path` and compare it with its digests.
+    """Read all of the store at `path`, compare it with its digests, and return its state.
 
     Raises StoreError if its metadata or axes are damaged, or there is none.
     """
@@ -322,9 +325,9 @@ def holds_all(path: Path, study: Study) -> bool:
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
-    """Load the study of an opened store into memory, with each distinct text once.
+    """Load the study of an opened store into memory, keeping each distinct text only once.
 
-    As stored, a status takes a hundred times the memory.
+    Statuses in their stored form take a hundred times the memory.
     """
     words = [name for name in every_variable() if name in runs and is_text(name)]
     loaded = runs.drop_vars(words).load()
@@ -332,7 +335,7 @@ def in_memory(runs: xr.Dataset) -> xr.Dataset:
 
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
-    """Return the texts as objects; equal texts share one object."""
+    """Return stored texts as an array of Python's, in which equal texts are one object."""
     settings = StudySettings.current()
     import pandas as pd
 
@@ -347,7 +350,7 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
 
 
 def _let_zarr_finish() -> None:
-    """Wait until Zarr has finished other writes after one of them failed."""
+    """Wait for Zarr's other writes after one of them has failed."""
     from zarr.core.sync import sync
 
     async def others() -> None:

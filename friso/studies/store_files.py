@@ -1,4 +1,4 @@
-"""Read files of a store safely.
+"""Read and write files of a store safely.
 
 A store may come from others, so only regular files of the store itself are read, and none larger than friso writes
 them.
@@ -28,22 +28,25 @@ MOST_BYTES = 64 << 20
 
 
 MOST_EXPANDED = 1 << 30
-"""Most bytes of the arrays in an archive, because a small archive may claim any size."""
+"""Most bytes of the arrays in an archive of results.
+
+It limits them because a small archive may claim any size.
+"""
 
 
 def stored(file: Path) -> bytes:
     """Read a file of a store.
 
-    Raises OSError, also for a link, a device, a pipe and more than MOST_BYTES.
+    Raises OSError, also for a link, a device, a pipe, or more than MOST_BYTES.
     """
     return content_of(file, MOST_BYTES, follow=False)
 
 
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
-    """Return the SHA-256 of a file of a store, or beside it; None if there is none.
+    """Return the SHA-256 of a file, of a store or beside it, or None.
 
-    It is also None for anything but a regular file, or for more than `most` bytes. Raises PermissionError if the file
-    cannot be read, which does not mean that it is damaged.
+    It is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
+    PermissionError if the file cannot be read, which does not mean that it is damaged.
     """
     try:
         return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
@@ -54,10 +57,9 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 
 
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
-    """Return the arrays that `keep_arrays` wrote into a file.
+    """Return the arrays that `keep_arrays` wrote into a file, or None.
 
-    They are None if they are damaged, are `about` something else, or have more than `most` bytes; none is expanded
-    then.
+    None if they are damaged, have another text `about`, or more than `most` bytes; no array is expanded then.
     """
     try:
         content = stored(file)
@@ -75,7 +77,7 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
 
 
 def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
-    """Store arrays in an archive, after a digest that detects damage and exchange.
+    """Store arrays in an archive, behind a digest that detects damage and exchanged files.
 
     The digest covers the arrays, the name of the file, and the text `about`. Raises OSError.
     """
@@ -118,8 +120,8 @@ def is_of_store(name: str) -> bool:
 def refuse_foreign(path: Path, files: Collection[str]) -> None:
     """Refuse a store with entries that Zarr must not read, nor friso write to.
 
-    The store has the given metadata `files`. Refused are links, devices, pipes, huge files, and files in place of
-    folders or the reverse. Raises StoreError.
+    `files` are its metadata files. Refused are links, devices, pipes, huge files, and files in place of folders or the
+    reverse. Raises StoreError for the first such entry.
     """
     folders = {BLOCKS, ANSWERS, *(name.partition("/")[0] for name in files if "/" in name)}
     for entry in _entries(path):
@@ -147,9 +149,9 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
 
 
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
-    """Yield all entries of a folder and its subfolders, each folder before its content.
+    """Yield the entries of a folder and its subfolders, down to `levels` levels.
 
-    It goes as deep as a store does, and follows no link.
+    Each folder comes before its content. No link is followed.
     """
     with os.scandir(folder) as entries:
         for entry in entries:

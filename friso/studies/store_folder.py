@@ -1,4 +1,4 @@
-"""Manage the folder of a store: make it aside, move it into place, exchange it, and lock it.
+"""Manage the folder of a store: make it elsewhere, move it into place, exchange it, lock it.
 
 The next process repairs what a killed process left. Beside a store `a.zarr`, `.a.zarr.<32 digits>` is a store being
 made, in a folder with its lock. With the suffix `.old` it is a store being replaced.
@@ -35,7 +35,7 @@ class ReadOnlyStoreError(StoreError):
 
 
 def where_links_lead(path: Path) -> Path:
-    """Return the real place of a store, following links.
+    """Return the real place of the store at `path`, following links.
 
     Files are made and replaced there. Raises StoreError for a link that leads nowhere, such as to a missing disk.
     """
@@ -81,7 +81,7 @@ def refuse_others_files(path: Path) -> None:
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
     """Replace the store at `path` by one that `fill` writes.
 
-    The old store's lock is held, and it is deleted once the new one is in place. Raises OSError, with the old store
+    `lock` holds the old store, which is deleted once the new one is in place. Raises OSError, with the old store
     unchanged. Ctrl-C waits until one of the two is in place.
     """
     with _made_aside(path, fill) as new, hold_interrupts():
@@ -98,10 +98,10 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
 
 
 def remove_leftovers(path: Path) -> None:
-    """Remove leftovers of killed processes beside the store at `path`.
+    """Remove what killed processes left beside the store at `path`.
 
-    A store that was being replaced is put back. Nobody holds the lock of such leftovers. Raises OSError if a store
-    cannot be put back.
+    A store that was being replaced is put back. Leftovers are recognised by locks that nobody holds. Raises OSError if
+    a store cannot be put back.
     """
     path = Path(os.path.realpath(path))
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
@@ -115,9 +115,9 @@ def remove_leftovers(path: Path) -> None:
 
 
 def remove_partial_files(path: Path) -> None:
-    """Remove partial files of a killed process from a locked store.
+    """Remove files that a killed process wrote only in part, from a locked store.
 
-    Every writer holds the lock.
+    No other process writes meanwhile, since every writer holds the lock.
     """
     for file in (*path.glob(f"*{PARTIAL}"), *path.glob(f"*/*{PARTIAL}")):
         if is_partial(file) and file.is_file():
@@ -126,7 +126,7 @@ def remove_partial_files(path: Path) -> None:
 
 @contextmanager
 def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
-    """Lock a store against other processes; return the lock.
+    """Lock the store at `path` against other processes; yield the lock.
 
     Raises StoreError if another one still has it after `patience` [s], ReadOnlyStoreError if nothing can be written.
     """
@@ -147,7 +147,7 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """Return the folder that `fill` has written, to be moved away.
+    """Yield the folder that `fill` has written, to be moved away.
 
     Ctrl-C waits until it is written: otherwise the threads of Zarr would write on into a deleted folder.
     """
@@ -164,5 +164,5 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:
-    """Return an unused name."""
+    """Return an unused, hidden path beside a store's `path`."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

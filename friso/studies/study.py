@@ -1,4 +1,4 @@
-"""Define a study as data: a stage, variations, tolerance, cells, and blocks of cells."""
+"""Define a study as data: its stage, variations, tolerance, cells, and blocks of cells."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CellBlock = tuple[slice, ...]
 
 @dataclass(frozen=True)
 class Dimension:
-    """A dimension of the result: one axis, or several that vary together (samples)."""
+    """A dimension of a study: one axis, or several that vary together (samples)."""
 
     name: str
     axes: tuple[SweptAxis, ...]
@@ -43,7 +43,7 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Study:
-    """A study: all inputs that determine the result.
+    """A study: a stage, its variations, and all else that determines the result.
 
     Cells are the combinations of the dimensions' values, in C order.
     """
@@ -57,7 +57,7 @@ class Study:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the numbers of values along the axes."""
+        """Return the numbers of values along the dimensions."""
         return tuple(len(dimension) for dimension in self.dimensions)
 
     @property
@@ -73,7 +73,7 @@ class Study:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return names of the dimensions."""
+        """Return the names of the dimensions."""
         return tuple(dimension.name for dimension in self.dimensions)
 
     @property
@@ -82,7 +82,10 @@ class Study:
         return tuple(axis for dimension in self.dimensions for axis in dimension.axes)
 
     def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the value of every axis at the cells with these numbers."""
+        """Return the values of every axis at cells, by name, (cells,).
+
+        `cells` are indices in C order.
+        """
         places = np.unravel_index(cells, self.shape)
         return {
             axis.name: axis.values[place]
@@ -91,7 +94,7 @@ class Study:
         }
 
     def block_columns(self, block: CellBlock) -> dict[str, np.ndarray]:
-        """Return the value of every axis at the cells of a block, in C order."""
+        """Return the values of every axis at the cells of a block, by name, in C order."""
         picked = [np.arange(len(dimension))[part] for dimension, part in zip(self.dimensions, block, strict=True)]
         places = [place.ravel() for place in np.meshgrid(*picked, indexing="ij")]
         return {
@@ -103,7 +106,7 @@ class Study:
     def block_shape(self, target: int) -> tuple[int, ...]:
         """Return the shape of blocks of about `target` cells.
 
-        They have whole trailing dimensions, and an equal part of the one before.
+        Blocks span the last dimensions whole, and an equal part of the one before.
         """
         shape = [1] * len(self.shape)
         for i in reversed(range(len(shape))):
@@ -114,15 +117,15 @@ class Study:
         return tuple(shape)
 
     def blocks(self, shape: Sequence[int]) -> Iterator[CellBlock]:
-        """Yield all blocks of a shape; those at the ends are cut to fit."""
+        """Yield all blocks of a shape (numbers of cells); those at the ends are cut to fit."""
         starts = (range(0, size, step) for size, step in zip(self.shape, shape, strict=True))
         for corner in product(*starts):
             yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
-        """Return the stage of one cell, which gives equal numbers when run alone.
+        """Return the stage of one cell, whose run alone gives the numbers of the study.
 
-        Raises InputError for an invalid cell.
+        `index` has the cell's index along each dimension. Raises InputError for an invalid cell.
         """
         columns = self.columns(np.array([np.ravel_multi_index(tuple(index), self.shape)]))
         numeric = {axis.name: axis for axis in self.axes if axis.numeric}
@@ -136,7 +139,7 @@ class Study:
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
-        """Return a study of only the numbered cells, side by side."""
+        """Return a study of only some cells, side by side, by their indices in C order."""
         columns = self.columns(cells)
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
@@ -144,7 +147,7 @@ class Study:
         return replace(self, dimensions=(Dimension(SAMPLE, axes),), refined=False)
 
     def coordinates(self) -> dict[str, Any]:
-        """Return coordinates for xarray: SI values with units and scale."""
+        """Return the axes as coordinates for xarray, by name: SI values with units and scale."""
         coordinates: dict[str, Any] = {}
         for dimension in self.dimensions:
             if dimension.name == SAMPLE:
@@ -174,7 +177,7 @@ class Study:
     def differences(self, other: Study, its_equations: str) -> list[str]:
         """Describe in words how a stored study, `other`, differs from this one.
 
-        The stored study was made by the version `its_equations`.
+        `its_equations` is the version of friso's equations that made the stored study.
         """
         differences = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
@@ -247,7 +250,7 @@ def _described(axis: SweptAxis) -> str:
 
 
 def _links(study: Study) -> str:
-    """Return the links as the user gave them."""
+    """Return the links of a study as text, as the user wrote them."""
     return ", ".join(f"{key}={expression}" for key, expression in study.links.items()) or "none"
 
 

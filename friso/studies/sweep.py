@@ -43,28 +43,42 @@ def sweep(
 ) -> xr.Dataset:
     """Run every combination of the axes' values.
 
-    An axis is a stage-file key with its values: an array with a unit, ``(np.linspace(1, 40, 41), "Hz")``, a range
-    ``"1 Hz..40 Hz:41"`` (``":log"`` behind it for a logarithmic one), a list of texts with units, or bare numbers,
-    words and booleans where the key takes these. `samples` adds a dimension "sample" along which several keys vary at
-    once (see `Samples`). `links` are SI expressions for keys that follow: with ``{"mass": (masses, "kg")}`` as axis,
+    An axis is a stage-file key with its values, which are one of these:
+
+    - an array with a unit, ``(np.linspace(1, 40, 41), "Hz")``;
+    - a range, ``"1 Hz..40 Hz:41"``, with ``":log"`` behind it if it is logarithmic;
+    - a list of texts with units;
+    - bare numbers, words or booleans, if the key takes these.
+
+    `samples` adds a dimension "sample" along which several keys vary at once (see `Samples`). `links` are SI
+    expressions for keys that follow. With ``{"mass": (masses, "kg")}`` as axis, they may be
     ``{"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass"}``.
 
-    The result has one dimension per axis with SI coordinates, and the variables (or the `metrics` among them) outcome
-    (what the run did at its end: "swings", "creeps", "rests" or "failed"), peaks (the thesis's count), distinct_peaks,
-    peak_to_peak [m], period [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N], steps,
-    rejected and status; a cell that no stage may have is "invalid", with the reason in its status. Asked for by name,
-    `metrics` are also those of what attracts the stage, whatever the motion does: amplitude [m], cycle_period [s] and
-    multiplier, of the largest swing that was found (NaN where nothing attracts; the multiplier also where no orbit
-    could be closed), with the attractor ("cycle", "swing" where no orbit could be closed, "nothing", "unknown" where
-    it is not certain); and the verdict on the stage ("hunts", "bistable", "transient", "settles" or "failed"). The
-    attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
+    The result has one dimension per axis, with SI coordinates. Its variables, or the `metrics` among them, are:
 
-    An outcome is as good as its tolerance: with `verify` that fraction of the cells is run again at rtol/100, and the
-    attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the
-    grid is made four times finer, of which a fifth is run, along the changes of outcome (and of verdict, if it is asked
-    for); the other cells are inferred, which their status says. With `store`, a folder, results are written there in
-    Zarr as they come, and a study that was interrupted resumes. Raises InputError for a wrong axis, link or store,
-    ValueError for a tolerance that is not usable.
+    - outcome: what the run did at its end, "swings", "creeps", "rests" or "failed";
+    - peaks (the thesis's count), and distinct_peaks;
+    - peak_to_peak [m] and period [s] at the end of the run;
+    - settling_time [s] into 1 um, and settling_time_10um [s];
+    - largest_force [N];
+    - steps and rejected, the solver's attempted and rejected steps, and status.
+
+    A cell that no stage may have is "invalid", with the reason in its status. If named in `metrics`, there are also
+    those of what attracts the stage, whatever its motion does:
+
+    - attractor: "cycle", "swing" where no orbit could be closed, "nothing", or "unknown" where it is not certain;
+    - amplitude [m], cycle_period [s] and multiplier, of the largest swing that was found. They are NaN where nothing
+      attracts, and the multiplier also where no orbit could be closed;
+    - verdict on the stage: "hunts", "bistable", "transient", "settles" or "failed".
+
+    The attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
+
+    An outcome is as good as its tolerance. With `verify`, that fraction of the cells is run again at rtol/100. The
+    attributes verified_cells and verified_surviving then count these cells and the outcomes that survived, and
+    verified_rtol is the tighter tolerance. With `refine` the grid is made four times finer. A fifth of it is run, along
+    the changes of outcome (and of verdict, if it is asked for). The other cells are inferred, which their status says.
+    With `store`, a folder, results are written there in Zarr as they come, and a study that was interrupted resumes.
+    Raises InputError for a wrong axis, link or store, ValueError for a tolerance that is not usable.
     """
     study = Request(stage, axes, samples, links or {}).study(metrics, rtol)
     study = finer(study) if refine else study
@@ -80,7 +94,7 @@ def run_in_memory(
 ) -> list[xr.Dataset]:
     """Run studies side by side, verify a fraction of each, and return them as datasets.
 
-    Refined studies are run one by one.
+    `verify` is that fraction of cells. Refined studies are run one by one.
     """
     tally = Tally(progress, sum(study.cells for study in studies))
     refined = {id(study): _refined(study, crew, tally) for study in studies if study.refined}
@@ -100,16 +114,20 @@ def run_in_memory(
 
 
 def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of a study's store, verify a fraction, and return the opened store.
+    """Run the missing blocks of a study's store, and return the study as read from the store.
 
-    The store is created if necessary. Raises InputError.
+    The store at `path` is created if necessary. `verify` is the fraction of cells to run again at a tighter tolerance.
+    Raises InputError for a folder that cannot be this store.
     """
     with Store.opened(path, study) as store:
         return fill(store, crew, verify, progress)
 
 
 def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run the missing blocks of an opened store, verify a fraction, and return its dataset."""
+    """Run the missing blocks of an opened store, and return the study as read from it.
+
+    `verify` is the fraction of cells to run again at a tighter tolerance.
+    """
     study, missing = store.study, list(store.missing())
     tally = Tally(progress, study.cells)
     tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
@@ -129,9 +147,9 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
 
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
-    """Return the measures of a refined study, each of its shape.
+    """Return the metrics of a refined study, each of its shape.
 
-    `keeping` may keep the answers of a resumed study.
+    `keeping` changes the function that computes cells, to store the results of an unfinished study.
     """
     everything = asked_for(study)
 
@@ -145,7 +163,7 @@ def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], As
 
 
 def dataset(study: Study, columns: Columns) -> xr.Dataset:
-    """Return the dataset of a study from its measures, each of the study's shape."""
+    """Return the dataset of a study from its metrics, each of the study's shape."""
     import xarray as xr
 
     variables = {

@@ -1,4 +1,4 @@
-"""Reduce runs of cells to lines to draw: extremes of the deviation over short times."""
+"""Reduce runs of cells to lines for drawing: extremes of the deviation over short times."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ DRAWING = "drawing runs"
 class Traces:
     """Deviations of positions from their references [m], reduced for drawing.
 
-    `deviations`, shape (cells, 2 BINS), has the two extremes of each of BINS pieces of `duration` [s], in order, NaN
-    after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final behaviour: half of
-    the time after its last corner.
+    `deviations`, shape (cells, 2 pieces), has two extremes in order of time for each of the equal pieces of `duration`
+    [s]. It is NaN after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final
+    behaviour: half of the time after its last corner.
     """
 
     deviations: np.ndarray
@@ -64,7 +64,10 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
 
 
 def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np.ndarray]:
-    """Return the reference [m] at the times of a numbered run; usually all have the same."""
+    """Return a function from the index of a run to its reference [m] at `time` [s].
+
+    Usually all runs have the same.
+    """
     moved = {key: value for key, value in flat.items() if key.startswith("motion.")}
     if not any(np.ndim(value) for value in moved.values()):
         reference = motion.reference(moved, time)
@@ -73,7 +76,7 @@ def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np
 
 
 def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return position minus reference [m]; NaN after the last sample."""
+    """Return a run's position minus reference [m], NaN after its last sample."""
     deviation = np.full(reference.shape, np.nan)
     sampled = position[: len(reference)]
     deviation[: len(sampled)] = sampled - reference[: len(sampled)]
@@ -81,7 +84,7 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def _extremes(values: np.ndarray) -> np.ndarray:
-    """Return the least and the largest value of each piece, in order of time.
+    """Return the least and the largest value of each piece of a run, in order of time.
 
     They are NaN if a piece is not complete.
     """

@@ -26,19 +26,19 @@ TRIED = 400
 
 
 def checked_share(share: float) -> float:
-    """Return the fraction of cells to verify. Raises InputError if it is no fraction."""
+    """Return the fraction of cells to verify, unchanged. Raises InputError if it is no fraction."""
     if not 0 <= share <= 1:
         raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
 
 
 def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a fraction of the cells again at rtol/100; return the fraction that survived.
+    """Run a fraction of the cells again at rtol/100, and count the outcomes that survive.
 
-    It is returned as attributes. A study always verifies the same cells. In a refined map, inferred cells are run too,
-    and counted apart (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could
-    survive. Nothing is returned if there are no others, no fraction was asked for, or the attributes of the runs state
-    it already.
+    The counts are returned as attributes for the study. A study always verifies the same cells. In a refined map,
+    inferred cells are run too, and counted apart (inferred_checked, inferred_confirmed). Invalid and failed cells have
+    no outcome that could survive. Nothing is returned if there are no others, if `share` is 0, or if the tolerance
+    cannot be tightened. It is also empty if the attributes of the runs state the counts already.
     """
     settings = StudySettings.current()
     if (
@@ -67,7 +67,7 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 
 
 def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
-    """Check attributes of a store, which others may have written.
+    """Check the attributes of a store that count verified cells; others may have written them.
 
     Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study with `cells` cells.
     """
@@ -79,11 +79,11 @@ def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
-    """Return the loosest tolerance at which `WANTED` of the outcomes survive.
+    """Return the loosest tolerance at which enough outcomes survive a tighter one.
 
-    Also returns the surviving fraction at each tolerance tried, and the number of cells used. If no cell has a valid
-    stage, there are no fractions, and the tightest tolerance is returned. If no tolerance is good enough, it is the one
-    at which most outcomes survive.
+    How many are enough is the setting `wanted_survival`. Also returns the surviving fraction at each tolerance tried,
+    and the number of cells used. If no cell has a valid stage, there are no fractions, and the tightest tolerance is
+    returned. If no tolerance is good enough, it is the one at which most outcomes survive.
     """
     settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
@@ -106,9 +106,9 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
 
 def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return up to `count` numbers of cells for which `condition` holds, ascending.
+    """Return up to `count` indices of cells for which `condition` holds, ascending.
 
-    They are drawn evenly, and always the same.
+    `condition` takes indices and returns which of them pass. The cells are drawn evenly, and always the same.
     """
     rng = np.random.default_rng(0)
     if study.cells <= 8 * count:
@@ -133,7 +133,7 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
 
 
 def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
-    """Return for each cell "run" if it ran to its end, `INFERRED`, or "" for neither."""
+    """Return for each cell "run" if it ran to its end, `INFERRED` if it was inferred, else ""."""
     status, outcome = (_at(runs[name], study, cells).astype(str) for name in ("status", "outcome"))
     kinds = np.where(np.isin(outcome, ["invalid", "failed", ""]), "", "run")
     return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

@@ -1,16 +1,18 @@
 """Linear active disturbance rejection: an extended state observer and its feedback.
 
 All that acts on the mass m besides the force F is one disturbance d: e'' = d - F/m for the error e. The observer has a
-triple pole at -w_o: with the correction c = e - e1, e1' = e2 + 3 w_o c, e2' = e3 - F/m + 3 w_o^2 c, e3' = w_o^3 c. The
-force F = m (w_c^2 e1 + 2 w_c e2 + e3) takes away what it estimates as d, and gives the mass a double pole at -w_c: two
-bandwidths, of which w_o is some times w_c (Gao 2003, doi 10.1109/ACC.2003.1242516; on the error, so that the
-acceleration of the reference is part of d: Madonski et al. 2023, doi 10.1007/s11768-023-00129-y).
+triple pole at -w_o. With the correction c = e - e1, it is
+    e1' = e2 + 3 w_o c, e2' = e3 - F/m + 3 w_o^2 c, e3' = w_o^3 c.
+The force F = m (w_c^2 e1 + 2 w_c e2 + e3) takes away e3, the estimate of d, and gives the mass a double pole at -w_c.
+So there are two bandwidths, of which w_o is some times w_c (Gao 2003, doi 10.1109/ACC.2003.1242516). The observer acts
+on the error, so that the acceleration of the reference is part of d (Madonski et al. 2023, doi
+10.1007/s11768-023-00129-y).
 
-Since F is known to the observer, it drops out: e1, e2 and e3 are the error behind linear filters, and F is the
+Since F is known to the observer, it drops out: e1, e2 and e3 are the error behind linear filters. F follows from the
 transfer function (Herbst 2021, doi 10.1007/s11768-021-00031-5)
-    F/e = m (n2 s^2 + n1 s + n0) / (s (s^2 + d1 s + d0)),
-here as an integral of the error beside a filter of the second order: three states, as many as the observer has. What
-the observer is told where a limit cuts the force is therefore up to the anti-windup, as in all controllers.
+    F/e = m (n2 s^2 + n1 s + n0) / (s (s^2 + d1 s + d0)).
+Here it is an integral of the error beside a filter of the second order: three states, as many as the observer has. What
+a limit of the force does to the observer is therefore up to the anti-windup, as in all controllers.
 """
 
 from __future__ import annotations
@@ -115,7 +117,7 @@ class DisturbanceRejection(ControllerSection):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the observer, then the feedback of its states."""
+        """Draw the controller: a box for the observer, then one for the feedback of its states."""
         canvas.box("observer: e1, e2, e3")
         canvas.box("m (w_c^2 e1 + 2 w_c e2 + e3)")
 
@@ -142,7 +144,7 @@ class DisturbanceRejection(ControllerSection):
 
 
 def crossing_ratio(observer_ratio: float) -> float:
-    """Return the 0 dB crossover of the loop over `bandwidth`, for a free mass that is known.
+    """Return the loop's 0 dB crossover over `bandwidth`, for a free mass of the assumed size.
 
     It depends only on the ratio of observer to feedback.
 

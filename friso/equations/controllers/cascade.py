@@ -39,7 +39,7 @@ SLOWER = 4.0
 
 
 class CascadeTerms(NamedTuple):
-    """Terms that are present; an absent term is absent from the equations."""
+    """Which terms a cascade has; terms that it lacks are left out of the equations."""
 
     position_integral: bool
     velocity_integral: bool
@@ -120,7 +120,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> CascadeTerms:
-        """Return which terms the controller has."""
+        """Return which terms the controller has, from a stage's keys in SI."""
         return CascadeTerms(
             position_integral=POSITION_TIME in flat,
             velocity_integral=VELOCITY_TIME in flat,
@@ -131,10 +131,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try.
+        """Return other structures to try: names to the keys that change [SI].
 
-        They move the integral to the other loop, add feedforward, drop the integral, and toggle pseudo-derivative
-        feedback.
+        They move the integral to the other loop, add feedforward, drop the integral, or switch pseudo-derivative
+        feedback on or off.
         """
         listed: dict[str, Mapping[str, Any]] = {}
         outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)
@@ -172,7 +172,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw one summing point per loop."""
+        """Draw the cascade: a box and a summing point for each loop, and the feedforward."""
         canvas.box("kv (1 + 1/(Tp s))" if POSITION_TIME in flat else "kv")
         if flat[cls.key("velocity_feedforward")]:
             canvas.sum(below="f dr/dt", minus=False)
@@ -201,7 +201,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
-        """Return the parts of the force [N]: position loop, velocity, integral, feedforward."""
+        """Return the force's parts by letter [N]: position loop, velocity, integral, feedforward."""
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         with blocks.loop("position"):

@@ -1,4 +1,4 @@
-"""Define the base of the two forms of the PID controller, and tell the forms apart."""
+"""Define the base of both ways to give a PID controller, by rules or by gains."""
 
 from __future__ import annotations
 
@@ -13,21 +13,24 @@ EITHER_FORM = 'crossover = "8 Hz", alpha = 0.1, beta = 2 or kp = "3 N/m", ki = "
 
 
 class Pid(ControllerSection):
-    """A PID controller."""
+    """A PID controller, given by tuning rules or by gains."""
 
     kind: Literal["pid"]
 
     written: ClassVar[str]
-    """Words for the keys of a form in a message."""
+    """Words for the keys of this way to give a controller, in a message."""
     needed: ClassVar[tuple[str, ...]]
-    """Names of the keys of which a table of this form has at least one."""
+    """Names of the keys of which a table that gives a controller this way has at least one."""
     asked: ClassVar[str]
-    """The needed keys, as written in a message."""
+    """The needed keys, in words for a message."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({"p": "proportional", "i": "integral", "d": "derivative"})
 
     @classmethod
     def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
-        """Return the form of a table: by rules or by gains. Raises StageError for both or neither."""
+        """Choose the class that reads a [controller] table: by rules or by gains.
+
+        Raises StageError for keys of both or of neither.
+        """
         by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.recognised_by)
         keys_of = {
             form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys

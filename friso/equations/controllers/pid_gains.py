@@ -28,7 +28,7 @@ SLOWER = 4.0
 
 
 class Terms(NamedTuple):
-    """Terms that are present; an absent term is absent from the equations."""
+    """Which terms a PID controller has; terms that it lacks are left out of the equations."""
 
     integral: bool
     filtered: bool
@@ -37,7 +37,7 @@ class Terms(NamedTuple):
 
 
 def proportional_derivative(stiffness: float, damping: float) -> dict[str, Any]:
-    """Return the flat keys of a controller with a stiffness [N/m] and a damping [N s/m]."""
+    """Return the keys of a controller with a stiffness [N/m] and a damping [N s/m], no integral."""
     return {KIND: "pid", KP: stiffness, KI: 0.0, KD: damping, TAU: 0.0, DERIVATIVE_ON: "error"}
 
 
@@ -86,7 +86,7 @@ class PidGains(Pid):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Terms:
-        """Return which terms the controller has."""
+        """Return which terms the controller has, from a stage's keys in SI."""
         derived = flat[KD] > 0
         return Terms(
             integral=bool(flat[KI] > 0),
@@ -102,7 +102,10 @@ class PidGains(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try: derivative of the other signal, feedforward, no integral."""
+        """Return other structures to try: names to the keys that change [SI].
+
+        They take the derivative of the other signal, add feedforward, or drop or add the integral.
+        """
         listed: dict[str, Mapping[str, Any]] = {}
         if flat[KD] and flat[DERIVATIVE_ON] == "error":
             listed["derivative of the measurement"] = {DERIVATIVE_ON: "measurement"}
@@ -121,9 +124,9 @@ class PidGains(Pid):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's gains and times.
+        """Return the controller's gains and times, and those of an equivalent P over PI loop.
 
-        Those of an equivalent P over PI loop follow, if there is one.
+        The latter are left out if there is no such loop.
         """
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]
@@ -139,7 +142,7 @@ class PidGains(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw a summing point where a term acts besides the error."""
+        """Draw the controller: a box for the terms on the error, and a summing point for the others."""
         derivative = "kd s/(1 + tau s)" if flat[TAU] else "kd s"
         on_error = flat[DERIVATIVE_ON] == "error"
         terms = ["kp", *(["ki/s"] if flat[KI] else []), *([derivative] if flat[KD] and on_error else [])]

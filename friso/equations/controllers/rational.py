@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SAMPLE_TIME, DRIVE_TIME, LOOP_TIME = f"{CONTROLLER}.sample_time", "drive.sample_time", "drive.position_sample_time"
 PARTS = "parts"
-"""Prefix of the flat keys that hold the coefficients of integral and sections."""
+"""Prefix of the keys in a stage that hold the coefficients of integral and sections."""
 
 AT_ZERO = 1e3 * ROUNDING
 """Largest distance from 0 (in z: from 1) at which a pole counts as an integrator, relative to the largest pole (in z:
@@ -48,10 +48,10 @@ class TransferRoots(NamedTuple):
 
 
 class RationalTerms(NamedTuple):
-    """Terms of the transfer function that are present.
+    """Which terms a transfer function has.
 
-    They are the integral, the number of poles beside it, whether coefficients are for samples, and whether the
-    integral leaks.
+    `integral` is true if it has one, and `leaks` if that leaks. `order` counts the poles beside it. `sampled` is true
+    if the coefficients are for samples.
     """
 
     integral: bool
@@ -61,7 +61,10 @@ class RationalTerms(NamedTuple):
 
 
 def _divides(flat: Mapping[str, Any]) -> Any:
-    """Tell whether the sample time of the controller is a whole multiple of the drive's."""
+    """Tell whether the sample time of the controller is a whole multiple of the drive's.
+
+    The result is true if one of both is missing, and an array if keys are arrays.
+    """
     if SAMPLE_TIME not in flat or DRIVE_TIME not in flat:
         return True
     ratio = flat[SAMPLE_TIME] / flat[DRIVE_TIME]
@@ -69,7 +72,7 @@ def _divides(flat: Mapping[str, Any]) -> Any:
 
 
 class RationalController(ControllerSection):
-    """Base of controllers that are transfer functions; a subclass says how its roots are given."""
+    """Base of controllers that are transfer functions; a subclass says how roots are given."""
 
     gain: Annotated[float, Number(positive, "1.0")] = 1.0
     """Factor on the force."""
@@ -103,7 +106,7 @@ class RationalController(ControllerSection):
 
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the flat keys with coefficients of the integral and the sections.
+        """Compute the keys that hold the coefficients of the integral and of second-order sections.
 
         The controller's sample time becomes the drive's, if the file gives none for the drive.
         """
@@ -115,7 +118,7 @@ class RationalController(ControllerSection):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> RationalTerms:
-        """Return which terms the transfer function has."""
+        """Return which terms the transfer function has, from a stage's keys in SI."""
         orders = (number for number in range(1, len(flat)) if cls.key(f"{PARTS}.{number}.b1") not in flat)
         sections = next(orders) - 1
         odd = sections > 0 and cls.key(f"{PARTS}.{sections}.a2") not in flat
@@ -124,7 +127,10 @@ class RationalController(ControllerSection):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the transfer function has a pole at s = 0 (z = 1), or a slow one close to it."""
+        """Tell whether the controller has an integral: a pole at s = 0 (z = 1).
+
+        A slow real pole counts as well, as an integral that leaks.
+        """
         return cls.key(f"{PARTS}.integral") in flat
 
     @classmethod
@@ -148,7 +154,7 @@ class RationalController(ControllerSection):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: RationalTerms) -> Mapping[str, Signal]:
-        """Return the terms of the integral and of the sections [N]."""
+        """Return the parts of the force [N]: the integral, and the product of the sections."""
         gain, speed = blocks.key("gain"), blocks.key("speed")
         rule = "bilinear" if variant.sampled else None
         with blocks.loop("position"):
@@ -186,7 +192,11 @@ def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, float]:
-    """Return the flat keys of integral, static stiffness and sections. Raises InputError."""
+    """Compute integral, static stiffness and sections of a transfer function, by key.
+
+    `sample_time` [s] is that of a transfer function in z, None for one in s. Raises InputError for a controller that is
+    unstable or does not pull back.
+    """
     zeros, poles, scale = _times(roots, sample_time)
     infinite = np.isinf(poles)
     if np.count_nonzero(infinite) > 1:
@@ -279,7 +289,8 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
     """Return the coefficients of s and s^2 of second-order factors.
 
-    With an odd number of times, the last factor is of first order and has None for s^2.
+    They are made of factors 1 + t s with the `times` t, in pairs. With an odd number of times, the last factor is of
+    first order and has None for s^2.
     """
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)
@@ -293,7 +304,7 @@ def _wrong(actual: str, expected: str) -> InputError:
 
 
 def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
-    """Return the error message for an unstable pole, in s or in z."""
+    """Make the error message for an unstable pole, in s or in z."""
     if sample_time is None:
         worst = poles[np.argmax(np.real(poles))]
         expected = "poles left of 0, and one at 0 for an integral; a transfer function in z needs its sample_time"

@@ -79,7 +79,7 @@ class TransferFunction(RationalController):
 
 
 def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
-    """Return the roots of numerator and denominator at a place of a stage file."""
+    """Return the roots of numerator and denominator in the table `place` of a stage file."""
     numerator, denominator = (
         [flat[key] for key in element_keys(flat, f"{place}.{name}")] for name in ("numerator", "denominator")
     )
@@ -87,6 +87,6 @@ def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
 
 
 def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """Return the roots under a key; the conjugates of complex roots are added."""
+    """Return the roots listed under a key; the conjugates of complex roots are added."""
     roots = [complex(flat[name]) for name in element_keys(flat, key)]
     return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])

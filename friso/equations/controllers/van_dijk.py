@@ -73,14 +73,17 @@ class VanDijk(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return the other structure to try: equal gains, with the derivative of the measurement."""
+        """Return another structure to try: equal gains, with the derivative of the measurement.
+
+        Returns its name and the keys that change [SI].
+        """
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the gains of Eq. 7, which follow from the keys, and those of any controller."""
+        """Return gain and time constants of Eq. 7, which follow from the keys, and the other gains."""
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
@@ -91,7 +94,7 @@ class VanDijk(Pid):
 
     @classmethod
     def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
-        """Draw the low-pass and the three terms, or three terms with a filtered derivative."""
+        """Draw the controller: a low-pass, then the three terms; or terms with filtered derivative."""
         if cls.variant(flat):
             canvas.box("k_p (1 + tau_z/tau_i + 1/(tau_i s) + tau_z s/(1 + tau_p s))")
             return
@@ -110,7 +113,7 @@ class VanDijk(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: str | None) -> Mapping[str, Signal]:
-        """Return the three terms of the force [N], by Eq. 7, or with the filter of Eq. 6."""
+        """Return the parts of the force [N], by Eq. 7; with `variant`, with the filter of Eq. 6."""
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         if variant:
             return {
@@ -135,12 +138,12 @@ def controller_table(crossover: str) -> dict[str, Any]:
 
 
 def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
-    """Return the flat keys of a controller for a crossover [Hz] and a mass [kg]."""
+    """Return the keys of a controller by van Dijk's rules, for a crossover [Hz] and a mass [kg]."""
     return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}
 
 
 def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
-    """Return k_p [N/m] and the times tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
+    """Compute k_p [N/m] and the times tau_z, tau_i, tau_p [s] from a stage's keys in SI."""
     from sympy import S
 
     from friso.equations.continuous import Continuous
@@ -160,7 +163,7 @@ def as_gains(k_p: float, tau_z: float, tau_i: float, tau_p: float) -> dict[str, 
 
 
 def rules(blocks: Blocks) -> dict[str, sp.Expr]:
-    """Return gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] by Eq. 8."""
+    """Return, as symbols, gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] by Eq. 8."""
     from sympy import pi, sqrt
 
     crossover, alpha, beta, mass = map(blocks.key, ("crossover", "alpha", "beta", "tuned_mass"))

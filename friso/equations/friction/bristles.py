@@ -1,6 +1,6 @@
 """Declare what friction laws with one damped bristle have in common.
 
-The rate of the bristle differs from law to law; the rest is as in LuGre.
+The laws differ in how fast the bristle deflects; the rest is as in LuGre.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ def bristle_friction(
     kinks: Sequence[Kink],
     sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
 ) -> Friction:
-    """Return friction of a bristle that deflects at `rate` [m/s]: F = s0 z + s1 z' + s2 v.
+    """Return friction of a bristle z that deflects at `rate` [m/s]: F = s0 z + s1 z' + s2 v.
 
-    s0, s1, s2 are stiffness, damping and viscous friction. The first of the `kinks` is the reversal of the velocity.
-    `sliding` holds states and modes in steady sliding, where the equations do not determine them.
+    s0, s1, s2 are stiffness, damping and viscous friction. The `kinks` are where derivatives jump; the first one is the
+    reversal of the velocity. `sliding` holds states and modes in steady sliding, where the equations do not determine
+    them.
     """
     from friso.equations.component import Component, Output, Role, State, key, state
 
@@ -45,9 +46,9 @@ def bristle_friction(
 
 
 def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
-    """Return keys of a law whose bristle has the measured stiffness and damping.
+    """Return the keys of a law with measured friction levels, bristle stiffness and damping.
 
-    The keys in `shape`, which shape the virgin curve, are added.
+    `shape` has further keys, which shape the virgin curve.
     """
     return {
         **measured.levels.keys,
@@ -58,7 +59,7 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 
 
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
-    """Return the violated condition of passivity of a damped bristle; "" if the law is passive.
+    """Return the condition of passivity that a damped bristle violates; "" if it is passive.
 
     A fully bent bristle yields `softer` times as fast as in LuGre. `power` writes that factor in the condition.
     """

@@ -36,12 +36,12 @@ LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "visc
 
 
 class Friction:
-    """A declared friction law: the force [N] against the velocity, its component and scales.
+    """A friction law's equations: the force [N] against the velocity, its states and its scales.
 
-    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` gives the
-    law's own states, its modes with memory, and the sides of its kinks other than the direction, in a steady motion at
-    the velocity. Without `sliding`, they are the values at which the states do not change. At rest all modes with
-    memory have been left.
+    `component` has states, outputs, and kinks (where derivatives jump). `breakaway` [N] is the largest force at rest,
+    from which the solver takes its length scale. `sliding` is for a steady motion at the velocity. It gives the law's
+    own states, its modes with memory, and the sides of its kinks other than the direction. Without `sliding`, they are
+    the values at which the states do not change. At rest all modes with memory have been left.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
     def with_values(self, values: Mapping[Any, Any]) -> Friction:
-        """Return the law with some expressions replaced, except in its scales and steady motion."""
+        """Return the law with expressions replaced by others, except in scales and steady motion."""
         part, force = self.component, cast(Any, self.force.xreplace(values))
         states = tuple(replace(x, derivative=x.derivative.xreplace(values)) for x in part.states)
         outputs = {name: replace(x, expression=x.expression.xreplace(values)) for name, x in part.outputs.items()}
@@ -66,8 +66,8 @@ class Friction:
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """Return the law's states, and the sides of its kinks, in steady motion at the velocity.
 
-        The side of the direction is left out. Raises ValueError if the law does not declare its sliding state and its
-        rates are not linear in its states.
+        Kinks are where derivatives jump; the reversal of the velocity is left out. Raises ValueError if the law does
+        not say how it slides steadily, and its equations are not linear in its states.
         """
         import sympy as sp
 
@@ -100,7 +100,7 @@ class Friction:
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
         """Return on which side of its kinks the law is, as conditions on its `states`.
 
-        The direction of the motion and modes with memory are left out.
+        Kinks are where derivatives jump; the direction of the motion and modes with memory are left out.
         """
         from friso.equations.cases import Piecewise
         from friso.equations.component import Switch
@@ -120,7 +120,8 @@ def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) ->
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
     """Return the kink at which the velocity [m/s] changes its direction, which all laws have.
 
-    `beyond` is 1 for a positive velocity. Friction may have a peak of width `narrow` [m/s] around the kink.
+    At a kink derivatives jump. `beyond` is 1 for a positive velocity. Friction may have a peak of width `narrow` [m/s]
+    around the kink.
     """
     from friso.equations.component import Kink
 
@@ -128,7 +129,7 @@ def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
 
 
 DIRECTION = "forward"
-"""Name of the kink of the direction."""
+"""Name of the kink (where derivatives jump) at which the velocity changes its direction."""
 
 
 def _is_direction(kink: Kink) -> bool:
@@ -140,7 +141,7 @@ class StribeckCurve(NamedTuple):
     """Choices that decide the equations of a Stribeck curve.
 
     `exponent` is given if it is a small whole number, and its powers are then written as products; otherwise it is
-    None. The other fields tell whether levels and viscous friction differ between directions, and whether [conditions]
+    None. The other fields are true if levels, or viscous friction, differ between directions, and if [conditions]
     multiply the levels.
     """
 
@@ -175,9 +176,10 @@ class StribeckSection(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Return the form of the Stribeck curve that decides the equations.
+        """Return the choices that decide the equations of a Stribeck curve, from the law's keys.
 
-        It depends on the exponent, if that is a small whole number, and on asymmetries.
+        They are the exponent, if it is a small whole number, whether directions differ, and whether there are
+        [conditions].
         """
         exponent = float(flat["friction.stribeck_exponent"])
         return StribeckCurve(
@@ -189,9 +191,9 @@ class StribeckSection(FrictionSection):
 
 
 def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j).
+    """Return the level of friction g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j).
 
-    It is smooth in v while the sign is held.
+    It is smooth in v while `sign`, the direction of the velocity, is held.
     """
     from sympy import exp
 
@@ -209,7 +211,10 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
 
 
 def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return g(v) [N] without a held sign, so that it is not differentiable at rest."""
+    """Return the level of friction g(v) [N] from the velocity alone.
+
+    It is not differentiable at rest.
+    """
     from sympy import Integer, sqrt
 
     from friso.equations.component import key
@@ -224,7 +229,7 @@ TINY = 1e-60
 
 
 def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return the viscous force [N], smooth in v while the sign is held."""
+    """Return the viscous force [N], smooth in v while `sign`, the direction of v, is held."""
     from friso.equations.component import key
 
     force = key("friction.viscous") * velocity

@@ -54,7 +54,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of Dahl's law: one level at all speeds.
+        """Return what measurements would show of Dahl's law: one level of friction at all speeds.
 
         It has no Stribeck velocity, and only viscous damping at rest.
         """
@@ -76,7 +76,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys; Dahl's law has no free shape."""
+        """Return the law's keys for measured friction; nothing of its shape is free."""
         return Dahl.keeping(measured, 1)
 
 

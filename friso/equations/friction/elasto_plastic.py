@@ -88,10 +88,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of a law that is purely elastic up to break-away.
-
-        Break-away is given by a deflection.
-        """
+        """Return what measurements would show of the law, which is elastic up to break-away."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
         force = virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement)
@@ -106,7 +103,10 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys with bristles that slip from a fraction of Coulomb friction onwards."""
+        """Return the law's keys for measured friction, with a break-away deflection from `shape`.
+
+        "elastic_share" is the fraction of the largest possible deflection at which bristles begin to slip.
+        """
         begins = shape["elastic_share"] * _most(measured)
         return keeping_bristle(measured, breakaway_deflection=begins)
 
@@ -117,7 +117,7 @@ class ElastoPlastic(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the violated condition of passivity.
+        """Return the condition of passivity that the law violates; "" if it is passive.
 
         The law is passive if LuGre with equal bristles is, because alpha lies between 0 and 1.
         """

@@ -158,7 +158,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of the law.
+        """Return what measurements would show of the law.
 
         From rest, each element is stretched until it carries its fraction of static friction.
         """
@@ -171,7 +171,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return elements whose polygon approximates the virgin curve by tangents.
+        """Return the keys of elements that approximate the measured virgin curve by its tangents.
 
         First stiffness and break-away are kept exactly. The attraction lets friction lag as in LuGre at the Stribeck
         velocity, s/C = g/(sigma_0 v_s).
@@ -188,10 +188,11 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return `FITTED` elements on the virgin curve of rolling friction, at evenly spaced slopes.
+        """Return `FITTED` elements on a virgin curve of rolling friction, at evenly spaced slopes.
 
-        `shape` has two factors. One multiplies the stiffness of all elements but the first. The other lengthens the lag
-        of friction relative to that of LuGre at the Stribeck velocity.
+        `shape` has the exponent of the rolling friction and some factors. One factor for each element but the first
+        makes the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck
+        velocity.
         """
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)
@@ -207,19 +208,19 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
-        """Return the range of the attraction: a factor of ten up and down.
+        """Return the range of the attraction [N/s], which measurements leave open, by its key.
 
-        No virgin curve determines it.
+        It is a factor of ten each way. No virgin curve determines the attraction.
         """
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the violated condition of passivity: static friction must equal Coulomb friction.
+        """Return the condition of passivity that the law violates; "" if it is passive.
 
-        Otherwise slip that slows down loads the elements without a displacement, and they return that energy when they
-        are unloaded.
+        Static friction must equal Coulomb friction. Otherwise slip that slows down loads the elements without a
+        displacement, and they return that energy when they are unloaded.
         """
         levels, stiffness, share = levels_under_conditions(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         gained = float((share**2 * (levels.static**2 - levels.coulomb**2) / (2 * stiffness)).sum())
@@ -268,9 +269,10 @@ def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.n
 
 
 def _tangents(measured: MeasuredFriction, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the elements of the polygon of tangents whose slopes are `levels`.
+    """Return elements, stiffness [N/m] and slip deflection [m], that make a polygon of tangents.
 
-    Slopes are relative to the first stiffness, from 1 down to 0.
+    The tangents touch the virgin curve where its slope has the values `levels`, relative to the first stiffness, from 1
+    down to 0.
     """
     slope = measured.stiffness * levels
     touched = np.interp(-slope, -measured.slope, measured.displacement)

@@ -48,25 +48,25 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of the law; from rest, F = F_s (1 - exp(-sigma_0 x/F_s))."""
+        """Return what measurements would show; from rest, F = F_s (1 - exp(-sigma_0 x/F_s))."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
         return on_bristles(flat, displacement, -static * np.expm1(-displacement * stiffness / static))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with measured stiffness and damping; the virgin curve keeps LuGre's shape."""
+        """Return the law's keys for measured friction; the virgin curve keeps LuGre's shape."""
         return keeping_bristle(measured)
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys; LuGre has no free shape."""
+        """Return the law's keys for measured friction; nothing of its shape is free."""
         return keeping_bristle(measured)
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity, sigma_2 >= sigma_1 (F_s - F_c)/F_c, if it is not met.
+        """Return the condition of passivity if it is violated: sigma_2 >= sigma_1 (F_s - F_c)/F_c.
 
-        Barabanov, Ortega 2000, doi:10.1109/9.839944.
+        It is due to Barabanov, Ortega 2000, doi:10.1109/9.839944.
         """
         return bristles_active(flat)

@@ -1,7 +1,7 @@
 """Describe friction as measurements show it, whatever the law.
 
 Measurements show steady friction over speed, the force over displacement from rest until sliding (the virgin curve),
-and damping at rest. Each law declares these quantities, and which of its parameters they do not determine.
+and damping at rest. Each law's file computes these, and says which of its parameters they leave open.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NEAR = 1e-6
 
 @dataclass(frozen=True)
 class Levels:
-    """Parameters of steady friction against velocity: a Stribeck curve (see `StribeckSection`)."""
+    """Parameters of steady friction over velocity in SI, a Stribeck curve (`StribeckSection`)."""
 
     static: float
     coulomb: float
@@ -74,7 +74,7 @@ class MeasuredFriction:
 def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
     """Return displacements [m] at which to compare virgin curves, shape (n,).
 
-    They reach beyond break-away, or to the last of `corners` if that lies farther, and include all `corners`, the
+    They reach beyond break-away, or to the last of `corners` if that lies farther. They include all `corners`, the
     displacements at which a curve made of straight pieces bends.
     """
     usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
@@ -87,18 +87,18 @@ def virgin_displacements(static: float, stiffness: float, corners: Sequence[floa
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """Return the Stribeck curve of a law without the factors of [conditions]."""
+    """Return the Stribeck curve of a law, from its keys in SI, without factors of [conditions]."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
 
 
 def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
-    """Return the Stribeck curve of a law with the factors of [conditions]."""
+    """Return the Stribeck curve of a law, from its keys in SI, with the factors of [conditions]."""
     return replace(levels_of(flat), **{name: float(level_under_conditions(flat, name)) for name in LEVELS})
 
 
 def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """Return the measured quantities of a law with a Stribeck curve and bristles.
+    """Return what measurements would show of a law with a Stribeck curve and bristles.
 
     Stiffness and damping are as in LuGre, and the virgin curve is `force` [N] over `displacement` [m].
     """
@@ -127,6 +127,9 @@ SLACK = 0.02
 
 
 def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
-    """Return the range of candidates that a measurement cannot distinguish from the best."""
+    """Return the range of candidates that a measurement cannot distinguish from the best.
+
+    Their misfit is almost as small.
+    """
     good = candidates[misfits <= np.min(misfits) + SLACK]
     return float(good.min()), float(good.max())

@@ -73,7 +73,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of the law; Dahl's exponent shapes the virgin curve."""
+        """Return what measurements would show of the law; Dahl's exponent shapes the virgin curve."""
         static, stiffness, i = (
             flat[f"friction.{name}"] for name in ("static", "bristle_stiffness", "rolling_exponent")
         )
@@ -83,14 +83,14 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with measured bristles and the exponent that fits the virgin curve best."""
+        """Return the law's keys for measured friction, its exponent fitted to the virgin curve."""
         return keeping_bristle(measured, rolling_exponent=best(*_exponent_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"rolling_exponent": (1.0, 1.5, 4.0)}
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return keys with bristles of the given exponent."""
+        """Return the law's keys for measured friction, with the exponent in `shape`."""
         return keeping_bristle(measured, rolling_exponent=shape["rolling_exponent"])
 
     @staticmethod
@@ -100,7 +100,7 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Return the condition of passivity, sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i, if not met.
+        """Return the condition of passivity if violated: sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i.
 
         It follows from z' v >= -v^2 ((F_s - F_c)/F_c)^i, with the power rounded.
         """
@@ -120,7 +120,7 @@ def softening(lacking: Any, exponent: Any) -> Any:
     """Return abs(r)^(i - 1), rounded at r = 0 and still 1 at rest.
 
     It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with d = ROUNDED. A bare power is 0 at r = 0. Bristles of a body that
-    rolls steadily would then not follow a small change of the level, and the linearised law would change abruptly as i
+    rolls steadily would then not follow a small change of the level. The linearised law would also change abruptly as i
     leaves 1. Rounding changes the force by less than d F_s.
     """
     return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)

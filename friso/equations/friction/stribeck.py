@@ -56,12 +56,15 @@ class Stribeck(StribeckSection):
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
-        """Return measured quantities of the law: friction over speed, and none before sliding."""
+        """Return what measurements would show: friction over speed, and none before sliding."""
         return MeasuredFriction(levels_of(flat), 0.0, 0.0, np.zeros(1), np.zeros(1))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with friction over speed, down to a hundredth of the Stribeck velocity."""
+        """Return the law's keys for measured friction over speed.
+
+        The curve is kept down to a hundredth of the Stribeck velocity.
+        """
         return {
             **measured.levels.keys,
             "friction.regularisation_velocity": SLOWEST * measured.levels.stribeck_velocity,

@@ -24,12 +24,12 @@ class Chirp(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return a single tone, whose frequency changes."""
+        """Say that the reference consists of one sinusoid."""
         return ReferenceForm(tones=1)
 
     @staticmethod
     def tones(flat: Mapping[str, Any]) -> Sequence[Tone]:
-        """Return the tone."""
+        """Return the sinusoid, with its changing frequency."""
         return [Tone(flat[AMPLITUDE], 0.0, flat[START], (flat[END] - flat[START]) / flat[DURATION])]
 
     @staticmethod

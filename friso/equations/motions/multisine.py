@@ -49,12 +49,12 @@ class Multisine(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return a tone for each frequency."""
+        """Say of how many sinusoids the reference consists: one for each frequency."""
         return ReferenceForm(tones=len(_numbers(flat, FREQUENCY)))
 
     @staticmethod
     def tones(flat: Mapping[str, Any]) -> Sequence[Tone]:
-        """Return the tones."""
+        """Return the sinusoids."""
         amplitudes, frequencies = _numbers(flat, AMPLITUDE), _numbers(flat, FREQUENCY)
         phases = _numbers(flat, PHASE) or [0.0] * len(frequencies)
         return [Tone(a, phase / (2 * pi), f) for a, f, phase in zip(amplitudes, frequencies, phases, strict=True)]

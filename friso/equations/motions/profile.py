@@ -40,7 +40,8 @@ not_zero = Bound("not 0", lambda value: value != 0)
 class Plan(NamedTuple):
     """A planned move of a distance [m].
 
-    `widths` are the widths of its averages [s], shape (order, ...), and `top` is its highest derivative [SI].
+    A move is a step, smoothed by moving averages: `widths` are their widths [s], shape (order, ...). `top` is the
+    move's highest derivative [SI].
     """
 
     distance: Any
@@ -93,8 +94,9 @@ def _widest(product_of_widths: Any, further: int, inner: Any) -> Any:
 def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
     """Return the pieces of a move that begins at a time [s] and a position [m].
 
-    Some pieces may have no duration. The highest derivative changes at every sum of some of the widths. The second half
-    mirrors the first, so that the move ends exactly at its target, at rest.
+    Some pieces may have no duration. A piece begins at every sum of some of the averages' widths (`Plan.widths`), where
+    the highest derivative changes. The second half mirrors the first, so that the move ends exactly at its target, at
+    rest.
     """
     order = len(move.widths)
     choices = np.array(list(product((0, 1), repeat=order)))
@@ -119,7 +121,7 @@ def corners(move: Plan, start: Any, position: Any) -> list[Piece]:
 
 
 def _later(derivatives: Sequence[Any], time: Any) -> list[Any]:
-    """Return the derivatives of a polynomial at a later time [s]."""
+    """Return the derivatives of a polynomial, position included, at a later time [s]."""
     later: list[Any] = []
     for k in range(len(derivatives)):
         total = derivatives[-1]
@@ -138,7 +140,7 @@ def _limits(flat: Mapping[str, Any]) -> list[Any]:
 
 
 def _moves(flat: Mapping[str, Any]) -> list[tuple[Plan, Any, Any]]:
-    """Return the moves, each with its start [s] and the position there [m]."""
+    """Return the planned moves, each with its start [s] and the position there [m]."""
     moves, start, position, limits = [], 0.0, 0.0, _limits(flat)
     for distance in _distances(flat):
         move = plan(distance, limits)
@@ -196,7 +198,7 @@ class MoveProfile(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return the form of the reference: polynomials whose degree is the number of limits."""
+        """Say what the reference consists of: polynomials whose degree is the number of limits."""
         return ReferenceForm(len(_limits(flat)))
 
     @staticmethod
@@ -206,13 +208,13 @@ class MoveProfile(Motion):
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return the distance between the outermost places at which the reference stands [m]."""
+        """Return the distance [m] between the outermost positions at which the reference stands."""
         places = np.cumsum([np.zeros_like(_distances(flat)[0]), *_distances(flat)], axis=0)
         return places.max(axis=0) - places.min(axis=0)
 
     @classmethod
     def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
-        """Return the place at the end of each move."""
+        """Return where the reference stands: from the end of each move to the start of the next."""
         moves = _moves(flat)
         leaves = [*(start for _, start, _ in moves[1:]), flat[DURATION]]
         return [Stand(start + move.time, until) for (move, start, _), until in zip(moves, leaves, strict=True)]
@@ -234,11 +236,14 @@ class MoveProfile(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the distances of longer moves, within the same limits."""
+        """Return the distances of moves longer by a factor, within equal limits, by key [SI]."""
         return {key: flat[key] * factor for key in element_keys(flat, DISTANCE)}
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return the ranges in which acceleration and velocity are varied."""
+        """Return the ranges in which acceleration and velocity are varied, by key [SI].
+
+        `shares` are the ends of these ranges, as multiples of the stage's own values.
+        """
         keys = ("motion.acceleration", "motion.velocity")
         return {key: (shares[0] * flat[key], shares[1] * flat[key]) for key in keys}

@@ -24,7 +24,7 @@ class Ramp(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the one piece of the reference: constant velocity, from position 0."""
+        """Return the one piece of the reference: constant velocity, from position 0 at time 0."""
         return [(0.0, 0.0, flat[VELOCITY], 0.0)]
 
     @staticmethod

@@ -32,5 +32,5 @@ class Release(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the displacement of a motion that is longer by a factor."""
+        """Return the displacement of a motion that is larger by a factor, by key [SI]."""
         return {DISPLACEMENT: flat[DISPLACEMENT] * factor} if np.any(flat[DISPLACEMENT]) else {}

@@ -23,12 +23,12 @@ class Sine(Motion):
 
     @staticmethod
     def form(flat: Mapping[str, Any]) -> ReferenceForm:
-        """Return a single tone."""
+        """Say that the reference consists of one sinusoid."""
         return ReferenceForm(tones=1)
 
     @staticmethod
     def tones(flat: Mapping[str, Any]) -> Sequence[Tone]:
-        """Return the tone."""
+        """Return the sinusoid."""
         return [Tone(flat[AMPLITUDE], 0.0, flat[FREQUENCY])]
 
     @staticmethod

@@ -32,5 +32,5 @@ class Step(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the step of a motion that is longer by a factor."""
+        """Return the size of a step that is larger by a factor, by key [SI]."""
         return {SIZE: flat[SIZE] * factor} if np.any(flat[SIZE]) else {}

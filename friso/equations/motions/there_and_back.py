@@ -26,7 +26,7 @@ def _time_there(flat: Mapping[str, Any]) -> Any:
 class ThereAndBack(Motion):
     """Two equal steps, there and back, each accelerating for acceleration_time and braking so.
 
-    With a cruise_ratio, at constant speed in between for so many times the acceleration_time.
+    With a cruise_ratio, a step has constant speed in between, for so many times the acceleration_time.
     """
 
     kind: Literal["there_and_back"]
@@ -57,7 +57,10 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def pieces(flat: Mapping[str, Any]) -> Sequence[Piece]:
-        """Return the pieces of a move there and back: time, position, velocity, acceleration."""
+        """Return the pieces of the move: start [s], position [m], velocity [m/s], and acceleration.
+
+        The acceleration is in [m/s^2].
+        """
         a, ramp, back = (flat[key] for key in (ACCELERATION, TIME, RETURN))
         size, top, cruise = ThereAndBack.motion_size(flat), a * ramp, flat.get(CRUISE)
         if cruise is not None:
@@ -83,18 +86,22 @@ class ThereAndBack(Motion):
 
     @classmethod
     def stands(cls, flat: Mapping[str, Any]) -> Sequence[Stand]:
-        """Return both ends of the motion, where the reference stops."""
+        """Return where the reference stands: at the far end until its return, then at the start."""
         rows = cls.pieces(flat)
         return [Stand(rows[len(rows) // 2 - 1][0], flat[RETURN]), Stand(rows[-1][0], flat[DURATION])]
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the acceleration time of a longer move."""
+        """Return the acceleration time of a move that is longer by a factor, by key [SI]."""
         return {TIME: flat[TIME] * factor**0.5} if np.any(flat[TIME]) else {}
 
     @staticmethod
     def varied(flat: Mapping[str, Any], shares: tuple[float, float]) -> Mapping[str, tuple[float, float]]:
-        """Return ranges of acceleration and its time; the outward move ends before the return."""
+        """Return the ranges in which acceleration and its time are varied, by key [SI].
+
+        `shares` are the ends of these ranges, as multiples of the stage's own values. The outward move must end before
+        the return.
+        """
         least, most = shares
         acceleration, time = flat[ACCELERATION], flat[TIME]
         if not acceleration * time:

@@ -93,8 +93,9 @@ def single_harmonic(
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return how often a complex function turns round zero along the edges of each cell.
 
-    This counts the zeros inside, with -1 for mirrored ones. The second result marks cells for which the count is
-    unknown, because a corner is NaN; the first is 0 there.
+    `left` has its values on a grid. The count is that of the zeros inside a cell; a zero about which the function turns
+    the other way counts -1. The second result marks cells for which the count is unknown, because a corner is NaN; the
+    first is 0 there.
     """
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
@@ -104,7 +105,10 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
-    """Tell whether solutions (2, count) lie in or next to their cells (count, 2)."""
+    """Return which solutions (2, count) lie in or next to their cells (count, 2).
+
+    `axes` are the values along both sides of the grid.
+    """
     near = np.ones(len(cells), bool)
     for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
@@ -114,13 +118,16 @@ def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.
 
 @dataclass(frozen=True)
 class _Loop:
-    """Both sides of the balance, as functions of log amplitude and log frequency (2, count)."""
+    """Both sides of the balance, 1/R and N, as functions of log amplitude and log frequency.
+
+    The arguments have the shape (2, count).
+    """
 
     stage: Stage
     rtol: float
 
     def left(self, logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return N - 1/R [N/m], complex, and the residual, both of shape (count,)."""
+        """Return N - 1/R [N/m], complex, and its residual (see `Balance`), both of shape (count,)."""
         amplitudes, frequencies = np.exp(logs)
         flat = self.stage.flat()
         stiffness = dynamic_stiffness(flat, amplitudes, frequencies, self.rtol)
@@ -142,7 +149,10 @@ class _Loop:
         return frequencies
 
     def polished(self, logs: np.ndarray) -> np.ndarray:
-        """Return solutions by Newton's method from nearby starts, which stay where no step exists."""
+        """Return solutions by Newton's method from nearby starts, both (2, count).
+
+        A start stays where no step can be computed.
+        """
         settings = FrequencySettings.current()
         for _ in range(settings.balance_newton_steps if logs.size else 0):
             sides = [

@@ -29,7 +29,7 @@ class DrivenPlant:
     """A plant at some frequencies [Hz], shape (frequencies,), without its friction.
 
     `compliances` [m/N], complex, shape (frequencies, 2, 2), are positions of stage and cart for forces on stage and
-    cart.
+    cart. `flat` has the stage's keys in SI, among them the friction.
     """
 
     flat: Mapping[str, Any]
@@ -44,10 +44,10 @@ class DrivenPlant:
         return cls(flat, frequencies, compliances, rtol)
 
     def answer(self, amplitudes: np.ndarray, which: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the forces [N] that move the cart by amplitudes [m] at numbered frequencies.
+        """Return the forces [N] that move the cart by amplitudes [m], shape (count,).
 
-        Also returns the positions of stage and cart over the forces [m/N], complex, and the dynamic stiffness of
-        friction [N/m], each of shape (count,).
+        `which` numbers the frequencies. Also returns the positions of stage and cart over the forces [m/N], complex,
+        (count, 2), and the dynamic stiffness of friction [N/m].
         """
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         compliances = self.compliances[which]
@@ -69,7 +69,7 @@ class DrivenPlant:
         )
 
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return amplitudes [m] that need less, and more, than each force at each frequency.
+        """Return amplitudes [m] that need less force, and more, than some forces [N].
 
         Both have the shape (forces, frequencies). They lie well beyond the amplitudes of a stuck and of a free cart,
         and do not depend on other forces.
@@ -91,7 +91,7 @@ class DrivenPlant:
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
-        """Return amplitudes moved until their forces lie below (side -1) or above (1) given ones."""
+        """Return amplitudes moved until they need less force (`side` -1) or more (1) than `forces`."""
         settings = FrequencySettings.current()
         amplitudes = np.clip(amplitudes, *LIMITS)
         force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
@@ -105,10 +105,10 @@ class DrivenPlant:
         return amplitudes
 
     def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return amplitudes [m] with their forces [N] on a grid, both (frequencies, points).
+        """Return amplitudes [m] and the forces [N] that they need, both (frequencies, points).
 
-        The third result, shape (forces, frequencies, points - 1), marks the cells in which a root for a force is
-        searched.
+        The third result, shape (forces, frequencies, points - 1), marks the cells of the grid in which an amplitude for
+        a force is searched.
         """
         settings = FrequencySettings.current()
         low, high = self.ends(forces)
@@ -128,9 +128,9 @@ class DrivenPlant:
 class Roots:
     """Amplitudes [m] of the cart in equilibrium with a force at a frequency, shape (count,).
 
-    `force` and `frequency` are indices. `rising` tells whether the force rises with the amplitude, and `error` is the
-    remaining relative error. `unknown`, of shape (forces, frequencies), tells whether friction was not found at an
-    amplitude at which a root may be.
+    `force` and `frequency` are indices. `rising` is true if the force rises with the amplitude, and `error` is the
+    remaining relative error. `unknown`, of shape (forces, frequencies), marks where friction was not found at an
+    amplitude that may be a root.
     """
 
     force: np.ndarray
@@ -142,7 +142,7 @@ class Roots:
 
 
 def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
-    """Return all amplitudes at which forces [N] move the cart, as far as the grid resolves."""
+    """Find all amplitudes at which forces [N] move the cart, as far as the grid resolves."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])

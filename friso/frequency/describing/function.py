@@ -39,8 +39,8 @@ def dynamic_stiffness(
 ) -> np.ndarray:
     """Return the dynamic stiffness N = F_1/A [N/m], complex, of friction, shape (count,).
 
-    Amplitudes [m] and frequencies [Hz] have the same shape; friction keys of `flat` may, too. NaN if no steady state
-    was found.
+    Amplitudes [m] and frequencies [Hz] have the same shape; friction keys of `flat`, which are in SI, may have it, too.
+    The result is NaN if no steady state was found.
     """
     if not len(amplitudes):
         return np.empty(0, complex)
@@ -62,16 +62,21 @@ def describing(
 ) -> xr.Dataset:
     """Describing function of the stage's friction, over amplitude [m] and frequency [Hz].
 
-    Variables over ("amplitude", "frequency"): `stiffness`, N = F_1/A [N/m], complex; `work` [J], what friction takes
-    out of the motion in a period; `gap`, by how much the law's own states miss themselves after a period, as a share
-    of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
-    harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
-    itself; the others come from `samples` samples of the period, whose accuracy `aliasing` estimates: by how much the
-    first harmonic from the samples differs from the integrated one, as a fraction of it (NaN if nothing was sampled,
-    which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
+    Variables over ("amplitude", "frequency"):
 
-    Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics, samples or an `rtol` that
-    are not usable. A pair that fails has NaN and a reason in `status`.
+    - `stiffness`: N = F_1/A [N/m], complex.
+    - `work` [J]: what friction takes out of the motion in a period.
+    - `gap`: how far the friction law's own states are from where they began, after a period, relative to their scales.
+    - `aliasing`: error of the harmonics from samples. It is the relative difference of the first harmonic from samples
+      to the integrated one, NaN if nothing was sampled.
+    - `status`: "done", or the reason why a pair of amplitude and frequency failed; its numbers are NaN then.
+
+    The variable `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the harmonics from the mean F_0
+    to F_`harmonics`. The solver integrates the first one itself; the others come from `samples` samples of the period.
+    With `harmonics` = 1 nothing is sampled, and F_0 is NaN unless the law is symmetric.
+
+    Raises InputError for a stage without friction, and for amplitudes, frequencies, harmonics, samples or an `rtol`
+    that are not usable.
 
     Examples
     --------
@@ -111,7 +116,7 @@ def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> 
 def _variables(
     amplitudes: np.ndarray, force: np.ndarray, rest: Mapping[str, np.ndarray]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
-    """Return dimensions, values (pairs, ...) and attributes of the variables."""
+    """Return a describing function's variables: dimensions, values (pairs, ...), attributes."""
     plane = ("amplitude", "frequency")
     stiffness = force[:, 1] / amplitudes
     named = {
@@ -129,7 +134,7 @@ def _variables(
 
 
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
-    """Return positive numbers as an array. Raises InputError."""
+    """Return positive numbers as an array. Raises InputError for anything else."""
     array = np.atleast_1d(np.asarray(values, dtype=float))
     if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0)):
         raise InputError(name, str(values), "positive numbers in one row", example)
@@ -137,10 +142,12 @@ def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: s
 
 
 def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return harmonics 0 to `count` of the force [N], shape (runs, count + 1).
+    """Return harmonics 0 to `count` of the friction force [N], shape (runs, count + 1).
 
-    They follow from periodic states of the law. The second result, shape (runs,), is the error of the first harmonic
-    if it is sampled.
+    `inner` holds the friction states at the start of a period, from which they repeat. The first harmonic is
+    integrated; the others come from `samples` points per period. The second result, shape (runs,), is the relative
+    error of the first harmonic by these points. It is NaN for `samples` = 0, in which case only the first harmonic is
+    known, and the mean of a symmetric law.
     """
     share, _ = share_of_period(friction)
     force = np.full((friction.count, count + 1), 0.0 if share < 1 else np.nan, complex)
@@ -157,9 +164,9 @@ def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int
 
 
 def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: int) -> np.ndarray:
-    """Return harmonics of the force [N] from states (runs, samples, states).
+    """Return harmonics of the friction force [N] from states (runs, samples, states).
 
-    The states are sampled over a part of the period.
+    The states are sampled over the fraction `share` of the period, with `samples` in a whole one.
     """
     within = round(samples * share)
     force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T

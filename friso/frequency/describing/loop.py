@@ -36,7 +36,7 @@ def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.nda
 
 @cache
 def _loop(form: Structure) -> Declared:
-    """Return the stage's own equations with a force in place of friction."""
+    """Return a stage's own equations in symbols, with a force in place of friction."""
     control = replace(form.controller, anti_windup=None) if form.controller else None
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)
@@ -47,6 +47,6 @@ def _loop(form: Structure) -> Declared:
 
 
 def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:
-    """Tell whether the limiter would be touched at largest joint deflections [m]."""
+    """Return where the limiter would be touched, for largest joint deflections [m]."""
     free = "joint.stroke" in flat and not flat["joint.locked"]
     return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)

@@ -27,12 +27,17 @@ def mass_line(
     """Return how far the measured plant lies off the line 1/(m omega^2), place by place.
 
     The mass m is the whole mass of the plant. `places` lists what differs there, as keys of the stage file with their
-    values, such as {"friction.static": "2 N"}; `forces` [N] and `frequencies` [Hz] are those of the measurement, `rtol`
-    the tolerance of its friction. Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser
-    that steps upwards (see `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value;
-    `phase` [rad], that of the response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force",
-    "frequency") are standard deviations over the places. Raises InputError for places that no stage may have, and as
-    `plant_response`.
+    values, such as {"friction.static": "2 N"}. `forces` [N] and `frequencies` [Hz] are those of the measurement, and
+    `rtol` is the tolerance of its friction. Variables over ("place", "force", "frequency"):
+
+    - `ratio`: the response that an analyser shows, stepping up in frequency (see `plant_response`), over the line. It
+      is complex, and 1 on the line.
+    - `magnitude`: absolute value of the ratio.
+    - `phase` [rad]: phase of the response over -180 degrees.
+
+    The variables `spread_magnitude` and `spread_phase` over ("force", "frequency") are standard deviations over the
+    places. Raises InputError for places that no stage may have, for a stage without friction, and for forces,
+    frequencies or an `rtol` that are not usable.
 
     Examples
     --------

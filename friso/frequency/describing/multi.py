@@ -1,10 +1,10 @@
 """Find a periodic motion of a loop with friction as a Fourier series.
 
 The method is multi-harmonic balance with Newton's method, alternating frequency and time (Cameron, Griffin 1989,
-doi:10.1115/1.3176036): the series gives the velocity in time, the velocity the friction force (`waveform`), and the
+doi:10.1115/1.3176036). The series gives the velocity in time, and the velocity the friction force (`waveform`). The
 harmonics of that force must move the loop by the series. Mechanics and controller may be any linear ones. The method
-starts from a known motion, such as a simulated one, because it cannot find a cycle by itself, and single-harmonic
-balance, the usual start, may have none (`balance`).
+cannot find a cycle by itself, and single-harmonic balance, the usual start, may have none (`balance`). So it starts
+from a known motion, such as a simulated one.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class HarmonicSeries:
         return float(np.ptp(self.over_period(self.stage)) / 2)
 
     def over_period(self, harmonics: np.ndarray) -> np.ndarray:
-        """Return the signal with these harmonics at many times of a period."""
+        """Return a signal with these harmonics, (orders,), at many times of a period."""
         settings = FrequencySettings.current()
         angles = np.linspace(
             0,
@@ -62,10 +62,11 @@ class HarmonicSeries:
 
 @dataclass(frozen=True)
 class Basis:
-    """Cosines and sines of the `orders`, at the middles of the intervals of a motion.
+    """Cosines and sines, the waves of which a periodic motion is made, with their slopes.
 
-    A motion that is its own mirror image has odd orders over half a period; any other motion has all orders over a
-    whole one.
+    They have the `orders` 1, 2, ... of the frequency, and are taken at the middles of the intervals of a period. A
+    motion that is its own mirror image has odd orders over half a period; any other motion has all orders over a whole
+    one.
     """
 
     orders: np.ndarray
@@ -76,7 +77,10 @@ class Basis:
 
     @classmethod
     def of(cls, harmonics: int, mirrored: bool, intervals: int) -> Basis:
-        """Make a basis up to a harmonic, with `intervals` per period."""
+        """Make the cosines and sines up to the order `harmonics`, with `intervals` per period.
+
+        A `mirrored` motion is its own mirror image after half a period.
+        """
         orders = np.arange(1, harmonics + 1, 2) if mirrored else np.arange(harmonics + 1)
         share = 0.5 if mirrored else 1.0
         angles = 2 * np.pi * (np.arange(int(intervals * share)) + 0.5) / intervals
@@ -86,7 +90,7 @@ class Basis:
         return cls(orders, -1.0 if mirrored else 1.0, waves, slopes, share)
 
     def harmonics(self, signal: np.ndarray) -> np.ndarray:
-        """Return complex harmonics (orders, columns) of signals at mid-intervals (M, columns)."""
+        """Return the complex harmonics (orders, columns) of signals at mid-intervals (M, columns)."""
         weights = np.where(self.orders == 0, 1.0, 2.0)[:, None] / len(self.waves)
         real, imaginary = np.split(self.waves.T @ signal, 2)
         return weights * (real + 1j * imaginary)
@@ -126,7 +130,7 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return the status of a series near a motion with the amplitude `length` [m]."""
+    """Return in words whether a series is a motion, near one of the amplitude `length` [m]."""
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
@@ -178,7 +182,7 @@ class _Problem:
         return np.concatenate([-imaginary * self.basis.orders, real * self.basis.orders])
 
     def jacobian(self, state: np.ndarray) -> np.ndarray:
-        """Return the derivative of the residual by the state."""
+        """Return the derivative of the residuals by the unknowns."""
         _, speed = self.split(state)
         answer, nudge = self.answer(state), 1e-6
         stretched = self.basis.slopes @ state[:-1]
@@ -196,7 +200,7 @@ class _Problem:
         return jacobian
 
     def solve(self) -> tuple[np.ndarray, float]:
-        """Return the state that solves the equations, and the last step."""
+        """Solve the equations by Newton's method; return the unknowns and the size of the last step."""
         settings = FrequencySettings.current()
         state, size = np.append(self.start, 0.0), np.inf
         for _ in range(settings.series_newton_steps):
@@ -210,7 +214,7 @@ class _Problem:
         return state, size
 
     def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
-        """Return the fraction of a step that leads closer to the solution."""
+        """Return what fraction of a step leads closer to the solution: 1, a half, a quarter, ..."""
         settings = FrequencySettings.current()
         shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])

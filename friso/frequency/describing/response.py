@@ -37,16 +37,24 @@ def plant_response(
 ) -> xr.Dataset:
     """First-harmonic response of the plant to sinusoidal actuator forces `forces` [N].
 
-    Variables over ("force", "frequency", "branch"), by rising amplitude, NaN where there are fewer: `response`, stage
-    position over force [m/N], complex; `cart_response` [m/N]; `amplitude` of the cart [m]; `stiffness` of friction
-    [N/m]; `lasting`, whether the force rises with the amplitude (1, 0, or NaN); `error`, relative, of the force. Over
-    ("force", "frequency"): `up` and `down`, the response [m/N] that an analyser shows which starts at rest at the
-    lowest, or highest, frequency, and steps to the others in turn: of the lasting branches the one nearest in amplitude
-    to that before, NaN where none lasts; `answers`, their number; `status`, also of forces and frequencies that are
-    beyond what can be computed. The answers to one force do not depend on what else is asked for.
+    A force may have several answers, or branches. Variables over ("force", "frequency", "branch") are in order of
+    rising amplitude, NaN where there are fewer branches:
 
-    Raises InputError for forces or frequencies that are not usable and for a stage without friction, and for an
-    `rtol` that is not usable.
+    - `response`: stage position over force [m/N], complex; `cart_response` [m/N]: that of the cart.
+    - `amplitude` [m] of the cart, and `stiffness` of friction [N/m], complex.
+    - `lasting`: 1 if the force rises with the amplitude, so that the branch is stable, 0 if it falls, else NaN.
+    - `error`: relative error of the force.
+
+    Variables over ("force", "frequency"):
+
+    - `up` and `down`: the response [m/N] that an analyser shows. It starts at rest at the lowest (or highest)
+      frequency, and steps to the others in turn. Of the lasting branches it shows the one nearest in amplitude to the
+      branch before, NaN where none lasts.
+    - `answers`: the number of branches.
+    - `status`: what is wrong, also with forces and frequencies that are beyond what can be computed, or "done".
+
+    The answers to one force do not depend on the other forces. Raises InputError for a stage without friction, and for
+    forces, frequencies or an `rtol` that are not usable.
 
     Examples
     --------
@@ -80,7 +88,7 @@ def plant_response(
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """Return the columns for every root, with units and text."""
+    """Return the quantities of every root, by name, with units and text."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
@@ -97,9 +105,9 @@ def _words(unit: str, text: str) -> dict[str, str]:
 
 
 def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return the indices of every root, and the number of roots in each cell.
+    """Return where every root belongs, and the number of roots for each force and frequency.
 
-    Indices are force, frequency, and rank by rising amplitude.
+    The places are indices of force, frequency, and rank by rising amplitude.
     """
     cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])
@@ -110,7 +118,10 @@ def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.nd
 
 
 def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int, int]) -> np.ndarray:
-    """Return the roots' values in an array over force, frequency and branch."""
+    """Spread the roots' values over an array of force, frequency and branch, NaN elsewhere.
+
+    `place` has the indices of each root.
+    """
     array = np.full((*shape, int(place[2].max(initial=0)) + 1), np.nan, values.dtype)
     array[place] = values
     return array
@@ -127,10 +138,10 @@ def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
 
 
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
-    """Return the branch that an analyser shows at every frequency, (forces, frequencies).
+    """Return the number of the branch that an analyser shows at every frequency.
 
-    It steps up (order 1) or down (-1), and shows the stable branch nearest in amplitude to the previous one; at the
-    start, the smallest.
+    The shape is (forces, frequencies). It steps up (`order` 1) or down (-1), and shows the stable branch nearest in
+    amplitude to the previous one; at the start, the smallest.
     """
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)

@@ -1,9 +1,9 @@
-"""Find the periodic steady state of friction under an imposed sinusoidal motion, in lanes.
+"""Find the periodic steady state of friction under an imposed sinusoidal motion.
 
 An internal state forgets its start as the motion wears it off. At amplitudes far below the deflection at break-away
 that takes thousands of periods. So secants solve for the fixed point of the map of the internal states over a period.
 LuGre's and Dahl's states obey linear equations under an imposed motion, so their map is affine and the first secant is
-exact.
+exact. Many motions are computed at once.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ RTOL = 1e-9
 
 @dataclass(frozen=True)
 class Imposition:
-    """Friction laws of one form, each under its own sinusoidal motion.
+    """Friction laws with equal equations, each under a sinusoidal motion of its own.
 
-    `flat` holds SI numbers or arrays of shape (count,), with the amplitude under "motion.displacement" [m] and the
-    frequency under "imposed.frequency" [Hz].
+    `flat` has their keys with SI numbers or arrays of shape (count,), the amplitude under "motion.displacement" [m] and
+    the frequency under "imposed.frequency" [Hz].
     """
 
     flat: Mapping[str, Any]
@@ -40,7 +40,10 @@ class Imposition:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
-        """Return the friction of stages at amplitudes [m] and frequencies [Hz], both (count,)."""
+        """Make the friction of stages under sinusoidal motions, all of shape (count,).
+
+        The motions have `amplitudes` [m] and `frequencies` [Hz]; `flat` has the stages' keys in SI.
+        """
         friction = {key: value for key, value in flat.items() if key.startswith("friction.")}
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
@@ -67,13 +70,16 @@ class Imposition:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Tell whether mirrored motions have mirrored forces, tested at random states."""
+        """Tell whether mirrored motions have mirrored friction forces, tested at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
         pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
-        """Return friction force and rates of the law's own states, from states (states, count)."""
+        """Return friction force and rates of change of the law's own states, (1 + inner, count).
+
+        They follow from states (states, count).
+        """
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         rates = module.right_hand_side(states, modes, 0.0, at_rest, self.values)
@@ -92,9 +98,10 @@ class Imposition:
         return Imposition(flat, len(numbers), self.rtol)
 
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
-        """Follow a part of a period from the law's own states (count, inner).
+        """Follow the motions over the fraction `share` of a period, in chunks.
 
-        There are `samples` per period.
+        Each begins at the law's own states, `inner`, (count, inner). There are `samples` per period. Yields the numbers
+        of the motions, and their results.
         """
         settings = FrequencySettings.current()
         starts = np.zeros((self.count, len(self.kernel.states)))
@@ -112,17 +119,20 @@ def _rows(rows: list[Any], count: int) -> np.ndarray:
 
 
 def periodic_gap(rtol: float) -> float:
-    """Return the gap up to which a state counts as periodic."""
+    """Return the largest gap of a state after a period at which it counts as periodic.
+
+    It is relative to the state's scale, and depends on the tolerance of the runs.
+    """
     settings = FrequencySettings.current()
     return min(settings.gap_tolerances * rtol, settings.widest_gap)
 
 
 @dataclass(frozen=True)
 class PeriodicStates:
-    """Periodic steady states of a friction law.
+    """Periodic steady states of a friction law under sinusoidal motions.
 
-    They are the law's own states at the farthest point of the motion (count, inner), the remaining `gap` after a period
-    relative to their scales, shape (count,), and which runs were completed, shape (count,).
+    `inner` (count, inner) are the law's own states at the farthest point of the motion. `gap` (count,) is their change
+    over a period, relative to their scales. `done` (count,) is true for completed runs.
     """
 
     inner: np.ndarray
@@ -131,7 +141,7 @@ class PeriodicStates:
 
 
 def steady(friction: Imposition) -> PeriodicStates:
-    """Return the periodic steady states.
+    """Find the periodic steady states of friction under its motions.
 
     For a symmetric law half a period suffices.
     """
@@ -154,15 +164,15 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """Return the part of a period that must be computed, and the sign of the states after it."""
+    """Return what fraction of a period must be computed, and the sign of the states after it."""
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 
 def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Take a secant step to the fixed point of the map over a period.
+    """Take a secant step to the fixed point of the map of the law's states over a period.
 
-    Starts from the states and the widths of the secants (count, inner). Returns the step, the error of the states after
-    a period, and which runs were completed.
+    The step starts from the states `inner`, with `width` the widths of the secants, both (count, inner). Returns the
+    step, the error of the states after a period, and which runs were completed.
     """
     share, sign = share_of_period(friction)
     count, size = inner.shape

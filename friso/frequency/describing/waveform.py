@@ -1,9 +1,10 @@
-"""Compute the friction force on any periodic motion, and its derivative.
+"""Compute the friction force on any periodic motion, and its derivative by the motion.
 
-Both are used for multi-harmonic balance. The derivative is by the motion. The law's own state obeys a differential
-equation under a velocity given at the middles of M equal intervals. The implicit midpoint rule makes it a chain that
-ends where it began. Over half a period of a symmetric motion it ends at the mirror image. The force at the middles
-follows. The rule is of second order, and a fast state settles on its steady value however long the intervals are.
+Multi-harmonic balance uses both. The period is divided into M equal intervals, at whose middles the velocity is given.
+The friction law has one state of its own, which obeys a differential equation. The implicit midpoint rule makes this a
+chain of M steps, which must end where it began. Over half a period of a symmetric motion it ends at the mirror image.
+The force at the middles follows. The rule is of second order, and a fast state settles on its steady value however long
+the intervals are.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from friso.stage.tables import friction_law
 class OneStateLaw:
     """A friction law with at most one state z, as functions of parameters, velocity and z.
 
-    They give the rate of z and the force, each with its derivatives by z and velocity.
+    They give the rate of change of z and the force, each with its derivatives by z and velocity.
     """
 
     values: Mapping[str, Any]
@@ -39,18 +40,18 @@ class OneStateLaw:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> OneStateLaw:
-        """Return the law of a stage.
+        """Make the functions from a stage's friction law; `flat` has its keys in SI.
 
-        Raises InputError for a stage without friction, or a law with more states or with modes that remember.
+        Raises InputError for a stage without friction, or a law with more states or with modes that have a memory.
         """
         form = imposed_form(flat)
         function, names, remembers = _compiled(form)
         return cls({name: flat[name] for name in names}, function, names, remembers)
 
     def at(self, velocity: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
-        """Return rate and force [N] at velocities [m/s] and states, each with its derivatives.
+        """Return the rate of z and the force [N], at velocities [m/s] and states z.
 
-        Derivatives are by z and by velocity.
+        Each is followed by its derivatives by z and by velocity.
         """
         values = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
         return [np.broadcast_to(np.asarray(value, dtype=float), velocity.shape) for value in values]
@@ -92,7 +93,7 @@ class FrictionAnswer:
     pushed: np.ndarray
 
     def along(self, velocities: np.ndarray) -> np.ndarray:
-        """Return changes of the force [N] for velocity changes [m/s], both (M, columns)."""
+        """Return how the force [N] changes with changes of the velocities [m/s], both (M, columns)."""
         direct = self.by_velocity[:, None] * velocities
         if self.chain is None:
             return direct
@@ -101,14 +102,17 @@ class FrictionAnswer:
 
 @dataclass(frozen=True)
 class Chain:
-    """States z_0 to z_M with given after[k] z_(k+1) - before[k] z_k, and z_M = sign z_0."""
+    """Equations of a chain of states, z_0 to z_M: after[k] z_(k+1) - before[k] z_k = right side.
+
+    The chain ends where it began, or at the mirror image: z_M = sign z_0.
+    """
 
     after: np.ndarray
     before: np.ndarray
     sign: float
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Return the states, shape (M + 1, columns), for given differences (M, columns)."""
+        """Return the states, shape (M + 1, columns), for right sides (M, columns) of the equations."""
         count = len(self.after)
         bands = np.zeros((2, count + 1))
         bands[0, 0], bands[0, 1:], bands[1, :-1] = 1.0, self.after, -self.before
@@ -124,9 +128,10 @@ def _middles(z: np.ndarray) -> np.ndarray:
 
 
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
-    """Return the friction on a motion with velocities [m/s] (M,) at mid-intervals [s].
+    """Compute the friction force on a periodic motion from velocities [m/s], shape (M,).
 
-    After the intervals the motion is back at its start (sign 1), or at the mirror image of its start (-1).
+    They are those at the middles of M intervals, each an `interval` [s] long. After these the motion is back at its
+    start (`sign` 1), or at the mirror image (-1).
     """
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)

@@ -29,8 +29,8 @@ BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 class Target(ArrayRows):
     """Motion that a run must reach to count as hunting: arrays of shape (count,), or numbers.
 
-    A run hunts if, after the time `lasting` [s], it still swings by at least `amplitude` [m], half of peak to peak,
-    with a period of at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
+    A run hunts if it still swings after the time `lasting` [s], by at least `amplitude` [m], half of peak to peak. Its
+    period must be at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
     Where attractors were only `observed` in simulations, others nearby may swing as far but less often.
     """
 
@@ -45,8 +45,8 @@ class Target(ArrayRows):
 class Attractors:
     """Result of surveying several stages; arrays have the shape (count,).
 
-    - `motions`: the attractors, as many of each stage as were looked for (see `attractors`).
-    - `decided`: every simulation that had to decide was completed.
+    - `motions`: the attractors; at least one of each stage that has any, all of them after a thorough survey.
+    - `decided`: whether the stage has an attractor is known; no failed or stopped run left it open.
     - `typical`: typical period of hunting [s].
     - `families`: cycles that the return map suggests to a thorough survey, stable or not, the symmetric ones first.
     - `flips`: simulations at two tolerances disagree; the tighter one holds.
@@ -118,12 +118,12 @@ def attractors(
     tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are finite.
 
     Without `cycles`, many stages are surveyed by simulation alone, and a motion that has converged counts as attracted.
-    A thorough survey runs all starts at once, as does one that is given `suggested` cycles: eight runs together take as
-    long as one. It also starts beside unstable cycles. A stage for which no suggested cycle was closed gets as many
-    starts as in a thorough survey.
+    A thorough survey runs all starts at once, as does one with `suggested` cycles: eight runs together take as long as
+    one. It also starts beside unstable cycles. A stage for which no suggested cycle was closed gets as many starts as
+    in a thorough survey.
 
-    A thorough survey that has used up its allowance returns the attractors it has by then; a stage counts as decided
-    where an orbit was closed. Other surveys raise Exhausted.
+    If its allowance of work is used up, a thorough survey returns the attractors it has by then; a stage counts as
+    decided where an orbit was closed. Other surveys raise Exhausted.
     """
     at_once = thorough or bool(suggested)
     survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=at_once)
@@ -156,7 +156,10 @@ def attractors(
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
-    """Confirm suggested stable cycles by runs, and add runs that start beside unstable cycles."""
+    """Confirm suggested stable cycles by runs, and add runs that start beside unstable ones.
+
+    `numbers` are the numbers of the stages in the survey.
+    """
     for cycles in suggested:
         survey.note_unstable_cycles(numbers, cycles)
         starts.beside(cycles)
@@ -165,7 +168,7 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
 
 
 def _try_memories(begun: Starts, survey: Survey) -> None:
-    """Survey stages that still have no attractor from states with bristles bent in many ways."""
+    """Survey stages that have no attractor yet, from starts with bristles bent by past motion."""
     left = np.flatnonzero(~survey.attracted)
     if left.size:
         starts = begun.take(left)
@@ -175,7 +178,7 @@ def _try_memories(begun: Starts, survey: Survey) -> None:
 
 
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
-    """Survey stages that still have no attractor from the cycles that the return map suggests.
+    """Survey stages that have no attractor yet, from cycles that the return map suggests.
 
     Near a fold the basin of a stable cycle is narrower than the spacing of the usual starts.
     """
@@ -189,9 +192,9 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
-    """Survey stages without a closed orbit again, at a tighter tolerance.
+    """Survey stages without a closed orbit again at a tighter tolerance, which decides.
 
-    Where both surveys disagree, the second one counts.
+    A stage for which only one of both surveys finds an attractor is marked in `flips` and stays undecided.
     """
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)

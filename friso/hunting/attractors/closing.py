@@ -51,10 +51,10 @@ def close_orbits(
 
 
 def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> np.ndarray:
-    """Return which closed orbits, shape (count,), only repeat a simpler orbit.
+    """Return which closed orbits, shape (count,), only repeat a simpler orbit of `fewer` swings.
 
-    After `fewer` swings such an orbit is back at the state in which the stage sticks, or at its mirror image if `fewer`
-    is odd.
+    After `fewer` swings, such an orbit is back at the state in which the stage sticks. If `fewer` is odd, it is back at
+    the mirror image of that state.
     """
     if not stages.count:
         return np.zeros(0, bool)
@@ -64,9 +64,9 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Return which orbits repeat the simpler orbit `once`, `passes` times each; shape (count,).
+    """Return which orbits repeat the simpler orbit `once` by `passes` times, shape (count,).
 
-    Orbits are compared by sticking distance and time.
+    Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
     """
     settings = SurveySettings.current()
     distances = np.abs(once.states[:, sticking]) / np.abs(orbits.states[:, sticking])
@@ -97,8 +97,8 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     """Return the index of the sample, with a fraction, at which the integrator is balanced.
 
-    If that happens several times, the instant after the longest standstill counts. `residuals` are the imbalance of the
-    integrator, `place` [m] the sticking position, both of shape (samples,).
+    If that happens several times, the instant after the longest standstill counts; 0 if it never happens. `residuals`
+    are the imbalance of the integrator, `place` [m] the sticking position, both of shape (samples,).
     """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed

@@ -63,9 +63,10 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
 
 
 def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
-    """Return how much the last swings differ from those `swings` earlier [m], shape (runs,).
+    """Return how far the last turning points are from those `swings` earlier [m], shape (runs,).
 
-    The last swings come before the column `end`.
+    `values` [m], shape (runs, swings), are the turning points. The last are those before column `end`, and the largest
+    difference counts.
     """
     compared = _compared(swings)
     last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]
@@ -73,5 +74,5 @@ def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
 
 
 def _compared(swings: int) -> int:
-    """Return how many swings are compared with earlier ones to detect a repetition."""
+    """Return how many swings to compare with earlier ones to detect a repetition after `swings`."""
     return max(swings, 4)

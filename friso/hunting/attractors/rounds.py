@@ -28,9 +28,9 @@ TIGHT = ToleranceSettings().tight_survey_rtol
 class Pending(ArrayRows):
     """Unfinished runs, one for each stage of the ensemble `stages`.
 
-    `states` (runs, kept) are the present states and `durations` [s] the lengths of the next round. `loose` [m] is the
-    distance from which a stage breaks away. `mirrored` marks stages for which the mirror image of a motion is a motion
-    too. Arrays have the shape (runs,) unless stated; `rtol` is the relative tolerance.
+    `states`, shape (runs, kept), are the states with their switched modes, and `durations` [s] the lengths of the next
+    round. `loose` [m] is the distance from which a stage breaks away. `mirrored` marks stages for which the mirror
+    image of a motion is a motion too. Arrays have the shape (runs,) unless stated; `rtol` is the relative tolerance.
     """
 
     stages: Ensemble
@@ -124,7 +124,11 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
-    """Return which runs have stood still so long that they cannot break away again, (runs,)."""
+    """Return which runs stood still so long that they cannot break away again, shape (runs,).
+
+    `ends` are the final states, `swing` [m] the peak-to-peak deviations over half of the `durations` [s]. `loose` [m]
+    is the distance from which a stage breaks away.
+    """
     settings = SurveySettings.current()
     distances = np.abs(ends[:, stages.sticking])
     home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > settings.rest_waits * wait(stages, loose))
@@ -135,10 +139,10 @@ def _stands_still(
 
 
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
-    """Lengthen the next round of runs.
+    """Return runs with a longer next round.
 
-    For a run that does not `swing`, (runs,), the round must show that the run rests or swings slowly. It must not be so
-    long that a run which starts to swing does so for most of the round.
+    If a run does not `swing`, shape (runs,), the round must show that it rests or swings slowly. It must not be so long
+    that a run which starts to swing does so for most of the round.
     """
     settings = SurveySettings.current()
     least = np.where(

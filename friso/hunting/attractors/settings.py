@@ -86,7 +86,7 @@ class SurveySettings(Settings):
     """Steps after which a run of a round is stopped. A run that chatters would hold up all others."""
 
     swing_leg_share: float = setting(0.25, "of peak to peak")
-    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing after landing."""
+    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""
 
     least_turns: int = setting(3, "")
     """Fewest turning points in the second half of a round of a stage that swings. With fewer it creeps."""

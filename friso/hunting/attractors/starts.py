@@ -80,7 +80,10 @@ class Starts:
                     self._add(owners, pushed(stages, side * speeds))
 
     def _wound_up(self, which: np.ndarray, side: float) -> None:
-        """Add runs released at distances on one side with their integrators wound up."""
+        """Add runs released at distances on one side, with their integrators wound up.
+
+        `which` are the numbers of the stages; `side` is 1 or -1.
+        """
         settings = SurveySettings.current()
         span, times = settings.wound_up_starts
         distances = np.geomspace(*span)
@@ -96,8 +99,8 @@ class Starts:
         """Add runs of stages with several bristles, bent in the ways in which motions leave them.
 
         Some runs are released at a distance, with the controller switched on before the release or at the release; some
-        are pushed. Others stick: after being drawn from the reference, after a long way out or back, and after random
-        travels to and fro.
+        are pushed. Others stick, after one of three pasts: a draw away from the reference, a long way out or back, or
+        random travels to and fro. A `thorough` survey gets more distances.
         """
         settings = SurveySettings.current()
         units = REMEMBERED[0 if thorough else 1]
@@ -131,31 +134,33 @@ class Starts:
         self._add(owners, cycles.states[owners] + (away * size)[:, None] * cycles.direction[owners])
 
     def stuck_at(self, distances: np.ndarray) -> None:
-        """Add runs stuck at the finite ones of some distances [m], (count, n)."""
+        """Add runs that begin stuck at distances [m].
+
+        `distances` has the shape (count, n), for n runs per stage; NaN adds none.
+        """
         owners, which = np.nonzero(np.isfinite(distances))
         if owners.size:
             self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
     def seen(self, owner: int, state: np.ndarray) -> None:
-        """Add runs slightly farther from rest, and slightly nearer, than the end of a run.
+        """Add runs that begin slightly farther from rest, and slightly nearer, than a run ended.
 
-        `state`, (kept,), is the final state of a run of stage `owner`. A run from that state itself could stay on a
-        weakly unstable cycle.
+        `state`, shape (kept,), is the final state of that run, and `owner` the number of its stage. A run from that
+        state itself could stay on a weakly unstable cycle.
         """
         settings = SurveySettings.current()
         states = np.outer(1 + np.array(settings.beside_cycle_shares), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
-        """Add runs of the stages `owners` (runs,) with the initial `states` (runs, states)."""
+        """Add runs with the initial `states` (runs, states); `owners` (runs,) number their stages."""
         self.owners.append(owners)
         self.states.append(states)
 
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
-        """Yield the runs ready for their first round, with the numbers of their stages.
+        """Yield groups of runs, ready for their first round, with the numbers of their stages.
 
-        All come in one wave if `at_once`. Otherwise they come in several, because a few runs suffice for most stages
-        that hunt.
+        There is one group if `at_once`, otherwise several, because a few runs suffice for most stages that hunt.
         """
         settings = SurveySettings.current()
         if not self.owners:
@@ -171,11 +176,14 @@ class Starts:
             left[which] = False
 
     def on_cycles(self, cycles: Cycles, which: np.ndarray) -> Pending:
-        """Return runs that begin on the cycles of the stages with numbers `which`."""
+        """Return runs that begin on the cycles of the stages numbered `which`."""
         return self._begun(which, cycles.states[which])
 
     def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
-        """Set the length of the first round of runs, and mark stages with mirror-image motions."""
+        """Make runs with the length of their first round and a mark for mirror-image motions.
+
+        `owners`, shape (runs,), are the numbers of their stages, `states` (runs, states) their initial states.
+        """
         settings = SurveySettings.current()
         stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)

@@ -67,9 +67,9 @@ _Kind = tuple[int, float, float]
 
 @dataclass(frozen=True)
 class _Beside(ArrayRows):
-    """Unstable cycles near which runs repeat, arrays of shape (runs,).
+    """Unstable cycles that runs resemble, arrays of shape (runs,).
 
-    `cycles` are the numbers of the cycles (-1: none). `offsets` tell how much farther each run swings than its cycle,
+    `cycles` are the numbers of the cycles (-1: none). `offsets` are how much farther each run swings than its cycle,
     relative to the cycle (0 without a cycle).
     """
 
@@ -78,7 +78,7 @@ class _Beside(ArrayRows):
 
     @classmethod
     def nothing(cls, count: int) -> _Beside:
-        """Return the case in which no run is near an unstable cycle."""
+        """Return the case in which none of `count` runs resembles an unstable cycle."""
         return cls(np.full(count, -1), np.zeros(count))
 
     @property
@@ -98,7 +98,10 @@ class _Beside(ArrayRows):
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
-    """Return which runs of the stages `owners` repeat like one of the given motions, (runs,)."""
+    """Return which runs have the period and size of one of the motions `kinds`, shape (runs,).
+
+    `owners`, shape (runs,), are the numbers of the runs' stages.
+    """
     settings = SurveySettings.current()
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
@@ -113,9 +116,10 @@ def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
 
 
 def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndarray | None = None) -> list[Swinging]:
-    """Return the stable cycles of numbered stages as motions.
+    """Return cycles as motions that attract the stages with these numbers.
 
-    With `which`, (count,), return the cycles marked there.
+    Unstable cycles are left out. `which` has the rows of the cycles to take instead of the stable ones. `sticking` is
+    the index of the state that is constant while a stage sticks.
     """
     return [
         Swinging(
@@ -134,7 +138,7 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
 
 @dataclass
 class Survey:
-    """State of a survey.
+    """State of a survey of several stages, and the ways to go on with it.
 
     A `thorough` survey looks for every attractor. A survey that must `prove` attraction closes orbits; otherwise a
     motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
@@ -183,7 +187,7 @@ class Survey:
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Return which stages diverge from all of the farthest starts, (count,)."""
+        """Return which stages diverge from farther starts than those that come to rest, (count,)."""
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
@@ -194,7 +198,7 @@ class Survey:
                 self._attracting_kinds.append((motion.stage, 2 * motion.amplitude, motion.time))
 
     def note_unstable_cycles(self, numbers: np.ndarray, cycles: Cycles) -> None:
-        """Store the unstable cycles of some stages, because runs take long to leave them."""
+        """Store the unstable cycles of numbered stages, because runs take long to leave them."""
         settings = SurveySettings.current()
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
@@ -205,7 +209,7 @@ class Survey:
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
-        """Follow runs of the stages `owners`, (runs,), round by round to their attractors."""
+        """Follow runs round by round to their attractors; `owners`, (runs,), number their stages."""
         settings = SurveySettings.current()
         before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
         for number in range(settings.most_rounds):
@@ -245,10 +249,10 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """Close orbits from runs that are ready, and return the runs that still swing.
+        """Close orbits from runs that repeat themselves; return the runs that still swing.
 
-        The result has the numbers of runs that still swing without an attractor. `early` restricts closing to runs that
-        repeat well and resemble no unstable cycle.
+        The result has the numbers of runs that still swing without an attractor. With `early`, orbits are closed only
+        from runs that repeat well and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
@@ -262,14 +266,20 @@ class Survey:
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
     def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return the swinging runs whose stages have steps left after this round."""
+        """Return the swinging runs whose stages have solver steps left after this round.
+
+        The stages of the others are marked unknown.
+        """
         np.subtract.at(self.left, owners, ends.steps)
         spent = self.left[owners[swinging]] <= 0
         self.unknown[owners[swinging[spent]]] = True
         return swinging[~spent]
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return, for each run, how many kinds of run of its stage the remaining steps allow."""
+        """Return for each run how many different motions of its stage may be followed on.
+
+        The number follows from the solver steps that are left.
+        """
         settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
         steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
@@ -279,16 +289,16 @@ class Survey:
     def _kinds(
         self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
     ) -> np.ndarray:
-        """Choose one run of each kind, to be followed in place of all runs of its kind.
+        """Choose one run of each kind, that is with equal period and size, to stand for the others.
 
-        Marks a stage unknown if it has more kinds of run than may be followed.
+        At most `most` runs per stage are chosen, by their numbers. A stage with more kinds is marked unknown.
         """
         chosen, surplus = _kinds(owners, ends, most, beside)
         self.unknown[owners[surplus]] = True
         return chosen
 
     def _beside(self, owners: np.ndarray, ends: Ends) -> _Beside:
-        """Return the nearest unstable cycle that each run resembles, and its offset from the cycle."""
+        """Find the nearest unstable cycle that each run resembles, and its offset from the cycle."""
         settings = SurveySettings.current()
         cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
         for number, kind in enumerate(self._closed):
@@ -298,17 +308,23 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an unstable cycle, or one that could not be closed as stable."""
+        """Return which runs resemble an unstable cycle, or a motion without a stable orbit."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an attractor of their stage that is in the survey already."""
+        """Return which runs already have an attractor in the survey, shape (runs,).
+
+        In a thorough survey the run must resemble it; in others any attractor of its stage will do.
+        """
         if not self.thorough:
             return self.attracted[owners]
         return _like(self._attracting_kinds, owners, ends)
 
     def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
-        """Close an orbit from one run of each kind among the runs numbered `which`."""
+        """Close orbits from one run of each kind among the runs numbered `which`.
+
+        Runs of one kind have equal period and size.
+        """
         most, repeats = SurveySettings.current().orbits_per_round if self.thorough else 1, ends.repeats
         kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # a slow approach to a symmetric cycle also repeats in pairs
@@ -325,7 +341,10 @@ class Survey:
     def _close_after(
         self, runs: Pending, owners: np.ndarray, ends: Ends, swinging: np.ndarray, swings: np.ndarray, times: np.ndarray
     ) -> None:
-        """Close orbits from the runs numbered `swinging`, after `swings` swings and `times` [s]."""
+        """Close orbits from the runs numbered `swinging`, and add them to the survey.
+
+        These runs repeat after `swings` swings and `times` [s].
+        """
         repeats = ends.repeats
         for group, cycles in close_orbits(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
             numbers = swinging[group]
@@ -338,7 +357,8 @@ class Survey:
     def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Record runs that still swing in the last round as attracted, unless they decay.
 
-        A run that may still be leaving an unstable cycle is first followed for as long as that takes.
+        A run that may still be leaving an unstable cycle is first followed for as long as that takes. `before` [m] has
+        the mean swing one round earlier.
         """
         settings = SurveySettings.current()
         kinds = self._kinds(owners, ends, settings.orbits_per_round)
@@ -355,7 +375,10 @@ class Survey:
         self._observe(owners[kinds], ends.take(kinds), before[kinds])
 
     def confirm(self, runs: Pending, owners: np.ndarray, cycles: Cycles) -> None:
-        """Add cycles of the stages `owners`, (runs,), if a run that begins on the cycle stays there."""
+        """Add stable cycles on which a run that begins there stays.
+
+        Run, stage number in `owners`, and cycle belong together row by row.
+        """
         settings = SurveySettings.current()
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < settings.same_motion_share
@@ -375,8 +398,8 @@ class Survey:
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs repeat as exactly as only a motion on an attractor does.
 
-        Where no proof is needed, runs that clearly approach a repetition count as well. A run that resembles an
-        unstable cycle counts only if it stays beside it.
+        Where no proof is needed, runs that clearly approach a repetition count as well. If proof is needed, a run that
+        resembles an unstable cycle counts only if it stays beside it; otherwise it never counts.
         """
         settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
@@ -394,7 +417,10 @@ class Survey:
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
-        """Add runs that swing steadily, but whose orbit was not closed, as observed attractors."""
+        """Add runs that swing steadily, but of which no orbit was closed, as observed attractors.
+
+        The stages of other runs are marked unknown. `before` [m] has the mean swing one round earlier.
+        """
         settings = SurveySettings.current()
         repeats = ends.repeats
         begun = (before == 0) & ~(
@@ -425,7 +451,7 @@ class Survey:
 def _kinds(
     owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Choose one run for each kind of run, at most `most` for each stage.
+    """Choose one run of each kind, that is with equal period and size, at most `most` per stage.
 
     Returns the numbers of the chosen runs, and of runs of further kinds. `most` is one number, or one for each run.
     Runs that do not repeat are of one kind only if they are very close. A few runs `beside` an unstable cycle stand for

@@ -1,8 +1,8 @@
 """Follow a hunting cycle along a line through the keys, around its folds.
 
 The method is pseudo-arclength continuation: Keller 1977, in Applications of Bifurcation Theory (Academic Press);
-Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7, chapter 10. A place from 0 to 1 measures the line; the distance at which
-the stage sticks measures the cycle.
+Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7, chapter 10. A stage's position on the line is its "place", from 0 to 1
+over the range of the keys. The cycle is measured by how far off the reference it sticks.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ NO_FARTHER = "it could not be followed farther"
 
 
 HUNDREDTH = float(np.log(1.01))
-"""Length of a line over which the key changes by one per cent, if places are logarithms of the key."""
+"""Change of place over which the key changes by 1 %, if the place is the key's logarithm."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """A cycle on a branch, at a place on the line.
+    """A cycle on a branch, at a `place` (mostly 0 to 1) on the line through the keys.
 
     `distance` and `time` are logarithms of its sticking distance [m] and its time of return [s]. `jacobians` is the
     Jacobian with which it was closed (see `Followed`), if it was followed from another cycle.
@@ -48,7 +48,7 @@ class Point:
 
     @classmethod
     def of(cls, stages: Ensemble, place: float, cycle: Cycles, jacobians: np.ndarray | None = None) -> Point:
-        """Make the point of one cycle."""
+        """Make the point of one cycle, from the stage that it belongs to and its place on the line."""
         distance = abs(float(cycle.states[0, stages.sticking]))
         return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle, jacobians)
 
@@ -59,7 +59,7 @@ class Point:
 
     @property
     def vector(self) -> np.ndarray:
-        """Return the point in the space of place, log distance and log time."""
+        """Return place, logarithm of distance and logarithm of time of the point, shape (3,)."""
         return np.array([self.place, self.distance, self.time])
 
 
@@ -67,7 +67,7 @@ class Point:
 class Branch:
     """Cycles in order along a branch, and the reasons why it ends on either side.
 
-    `sign` is -1 for cycles closed over half a period, 1 for a whole one.
+    `sign` is -1 for cycles closed over half a period, 1 for cycles closed over a whole one.
     """
 
     sign: float
@@ -78,10 +78,10 @@ class Branch:
 class Tracer:
     """Tracer of one cycle along a line of stages, from place 0 to the `farthest`.
 
-    The line is a family with one member. `sign` and `swings` are those of the cycle; None means the fewest swings
-    possible. Steps are `pace` times as long as for drawing a curve and at least `shortest`; the first has the length
-    `first`. The cycle is followed while its multiplier is below `steepest`. `hundredth` gives, at a place, the length
-    of the line over which the key changes by one per cent.
+    `family` gives the stages by place. `sign` is -1 for a cycle closed over half a period, 1 for a whole one; `swings`
+    counts its swings in that time (None: the fewest possible). Steps are `pace` times as long as for drawing a curve,
+    and at least `shortest`; the first has the length `first`. The cycle is followed while its multiplier is below
+    `steepest`. `hundredth` gives, at a place, the length of line over which the key changes by one per cent.
     """
 
     def __init__(
@@ -125,7 +125,11 @@ class Tracer:
     def _solved(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
-        """Find the cycle as `solve` does, with the Jacobian of the nearby cycle if it has one."""
+        """Make one attempt to find a cycle on a plane in the space of place, log distance, log time.
+
+        The plane passes through `target` with the normal `normal`. The Jacobian of the cycle `near` is used, if it has
+        one. Returns None if no cycle is found.
+        """
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -145,7 +149,7 @@ class Tracer:
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
     ) -> tuple[list[Point], str]:
-        """Follow the branch from a point to one side; return its points and why it ends.
+        """Follow the branch from a point to one side; return its further points, and why it ends.
 
         `ahead` is 1 or -1. The walk ends with the first point for which `until` holds, given the point before it and
         the point itself. Without `until`, a branch of asymmetric cycles also ends where it meets the symmetric cycle.
@@ -188,7 +192,10 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk ended at the farthest place, rather than back at the first one."""
+        """Tell whether a walk ended at the farthest place on the line of keys.
+
+        False if it ended at the first place, or for another reason.
+        """
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
@@ -202,9 +209,10 @@ class Tracer:
         return [terminal] if terminal else []
 
     def _is_mirrored(self, start: Point, point: Point) -> bool:
-        """Tell whether a cycle of a symmetric stage leans to the other side than the start.
+        """Tell whether the middle of an asymmetric cycle has passed to the reference's other side.
 
-        Beyond the symmetric cycle a branch of asymmetric cycles continues as its own mirror image.
+        Beyond the symmetric cycle a branch of asymmetric cycles continues as its own mirror image. The result is false
+        for stages without mirror-image motions.
         """
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         leans = float(point.cycle.middle[0] * start.cycle.middle[0])

@@ -10,7 +10,11 @@ from friso.hunting.boundary.settings import ContinuationSettings
 
 
 class Crossing(NamedTuple):
-    """Place at which values pass zero, with its error bound `reserve` and the slope there."""
+    """Where values pass zero over a key's range, with an error bound and the slope there.
+
+    `place` runs from 0 to 1 over the range, and `reserve` bounds its error. `slope` is the change of the value per
+    place.
+    """
 
     place: float
     reserve: float
@@ -18,7 +22,7 @@ class Crossing(NamedTuple):
 
 
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
-    """Find the last zero of a cubic through values, (n,), in the direction of their trend.
+    """Fit a cubic to values over places, shape (n,); return its last zero along their trend.
 
     The error is twice the shift of the zero by the scatter of the values, or the distance to another zero of the cubic.
     Returns None if there are too few values, if the cubic does not pass zero, or if the error exceeds half of the range
@@ -43,7 +47,10 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 
 
 class FoldBack(NamedTuple):
-    """A fold of a branch: the length along the branch, the place, and the place's error bound."""
+    """A fold: how far along the branch it lies, where in the key's range, and with what error.
+
+    `place` runs from 0 to 1 over the key's range, and `reserve` bounds its error.
+    """
 
     length: float
     place: float
@@ -51,10 +58,11 @@ class FoldBack(NamedTuple):
 
 
 def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
-    """Find where a cubic through places, (n,), over lengths turns back, nearest to length 0.
+    """Fit a cubic to places over lengths along a branch, shape (n,); return where it turns back.
 
-    The error of the place is twice the scatter about the cubic. Returns None if there are too few places, if the cubic
-    does not turn within the lengths, or if the error exceeds half of the range of places.
+    Of several such points, the one nearest to length 0 counts. The error of the place is twice the scatter about the
+    cubic. Returns None if there are too few places, or if the cubic does not turn within the lengths. It does so too if
+    the error exceeds half of the range of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None

@@ -26,8 +26,8 @@ from friso.hunting.cycle.find import RTOL
 class Spot:
     """Point of a curve on which a cycle flips or folds.
 
-    `at` is its place in the box of the keys, shape (2,), and `special` the located point. `across` is the direction of
-    the line on which it was located, shape (2,).
+    `at`, shape (2,), are its coordinates in the box of the two keys, each from 0 to 1. `special` is the located point
+    of the cycle. `across`, shape (2,), is the direction of the line on which it was located.
     """
 
     at: np.ndarray
@@ -41,7 +41,7 @@ class Spot:
 
     @property
     def error(self) -> np.ndarray:
-        """Return the error of the place along each key, shape (2,)."""
+        """Return the error of the point's coordinates along each key, shape (2,)."""
         if not np.isfinite(self.special.error):
             return np.full(2, np.inf)
         return np.abs(self.special.error * self.across)
@@ -69,8 +69,9 @@ class Curve:
 class Expected:
     """Prediction of the next point of a curve.
 
-    `at` is the place, shape (2,), `size` the logarithms of the cycle's distance [m] and time [s]. `states` (1, states)
-    lie on the cycle, and `direction`, shape (2,), is the direction of the curve there.
+    `at`, shape (2,), are its coordinates in the box of the keys, each from 0 to 1; `size` are the logarithms of the
+    cycle's distance [m] and time [s]. `states` (1, states) lie on the cycle, and `direction`, shape (2,), is the
+    direction of the curve there.
     """
 
     at: np.ndarray
@@ -101,7 +102,8 @@ class CurveTracer:
     ) -> Spot | None:
         """Find the point of the curve on a line, at most `reach` from the line's `origin`.
 
-        The search starts from the point `near` it, or from the `expected` one. Returns None if it fails.
+        The line has the direction `across`. The search starts from the point `near` it, or from the `expected` one.
+        Returns None if it fails.
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
@@ -178,7 +180,7 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """Find where the curve leaves the box; return a list of one point, or an empty list."""
+        """Find where the curve leaves the box of the keys; return a list of that point, or none."""
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
@@ -192,7 +194,7 @@ class CurveTracer:
         return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
-        """Describe a place in the box by the keys with their values and units."""
+        """Return keys with their values and units, in words, at coordinates (2,) in the box."""
         values = self.space.values(at[None])
         units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)

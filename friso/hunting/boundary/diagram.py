@@ -26,9 +26,9 @@ BRANCHES = "following branches of cycles"
 class Diagram:
     """Bifurcation diagram over a range of one key: branches of cycles, and special points.
 
-    The arrays belong to stages spaced evenly over the range, at `places`. `cycles` are their hunting cycles.
-    `attracts` says whether there is an attractor, `decided` whether that is known. `unstable` says whether the loop is
-    unstable regardless of friction. Each has the shape (places,).
+    The arrays belong to stages spaced evenly over the range, at `places` from 0 to 1. `cycles` are their hunting
+    cycles. `attracts` is true for a stage with an attractor, and `decided` if that is known. `unstable` is true if the
+    loop is unstable regardless of friction. Each has the shape (places,).
     """
 
     space: Space
@@ -41,7 +41,7 @@ class Diagram:
     unstable: np.ndarray
 
     def value(self, place: float) -> float:
-        """Return the value of the key [SI] at a place."""
+        """Return the value of the key [SI] at a place from 0 to 1 in its range."""
         return float(self.space.ranges[0].at(np.array(place)))
 
     def error(self, special: LocatedPoint) -> float:
@@ -49,15 +49,18 @@ class Diagram:
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
     def in_doubt(self, places: np.ndarray) -> np.ndarray:
-        """Return which places, (n,), lie within the error of a special point.
+        """Return at which places (0 to 1 in the key's range) stability is unknown, shape (n,).
 
-        Stability is unknown there.
+        It is unknown within the error of a special point.
         """
         return _in_doubt(self.special, places)
 
 
 def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> np.ndarray:
-    """Return which places, (n,), lie within the error of a special point."""
+    """Return which places, shape (n,), lie within the error of a special point.
+
+    Places run from 0 to 1 over the key's range.
+    """
     near = [np.abs(spot.point.place - places) < spot.error for own in special for spot in own]
     return np.any([np.zeros(len(places), bool), *near], axis=0)
 
@@ -66,8 +69,8 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
     """Follow every cycle that is found at `seeds` stages over the range of one key.
 
-    The cycles are the symmetric and asymmetric ones that the return map suggests, and the cycles that simulations end
-    in, of any number of swings. Orbits are closed to a relative tolerance.
+    The cycles are those that the return map suggests, and those in which simulations end, of any number of swings.
+    Orbits are closed to the relative tolerance `rtol`.
     """
     settings = ContinuationSettings.current()
     places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
@@ -79,7 +82,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     special: list[tuple[LocatedPoint, ...]] = []
 
     def follow(number: int, cycle: Cycles) -> bool:
-        """Follow the branch through a cycle, and return whether it was followed.
+        """Follow the branch through the cycle of a numbered stage; return whether it was followed.
 
         A branch that passes a cycle of an earlier branch is not followed.
         """
@@ -135,9 +138,10 @@ def each_once(
 
 
 def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
-    """Tell whether two special points are the same point.
+    """Tell whether two special points are the same point, computed twice.
 
-    They are if kind and cycle are equal, and they are no farther apart than `close` or their errors.
+    Kind, sign and swings of the cycle must be equal. The points must be no farther apart than `close` or their errors,
+    and their cycles of almost equal size.
     """
     settings = ContinuationSettings.current()
     close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])

@@ -27,9 +27,10 @@ ALONG = np.array([1.0, 0.0, 0.0])
 class LocatedPoint:
     """Point at which a branch loses or gains stability.
 
-    `direction` is the direction of the branch there. `error` is the error of the place: the residual of the search plus
-    the shift when computed at a hundredth of the tolerance. With a limiter that chatters it is the error bound of
-    `smoothed` or `turned`. `slope` is the change of the multiplier along the direction.
+    `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
+    key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter
+    that chatters it is the error bound of `smoothed` or `turned`. `slope` is the change of the multiplier along the
+    direction.
     """
 
     kind: Bifurcation
@@ -39,9 +40,9 @@ class LocatedPoint:
     slope: float = np.nan
 
     def in_doubt(self, point: Point) -> bool:
-        """Tell whether stability is unknown at a point of the branch near this special point.
+        """Tell whether a cycle of the branch is so near this point that its stability is unknown.
 
-        It is if it lies within the error of the special point.
+        It is if the cycle lies within the error of the special point.
         """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
@@ -49,14 +50,14 @@ class LocatedPoint:
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
-    """Return the signed difference between the multiplier and its value at this kind of point."""
+    """Return how far the multiplier is from its value at this kind of point, with a sign."""
     if kind == "torus":
         return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
 
 
 def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
-    """Return the kinds of special point that lie between two neighbours on a branch."""
+    """Return the kinds of special point (flip, fold, torus) between two neighbours on a branch."""
     if _complex(first) or _complex(second):
         return ("torus",) if (abs(first.multiplier) - 1) * (abs(second.multiplier) - 1) < 0 else ()
     kinds: tuple[Bifurcation, ...] = ("flip", "fold")
@@ -64,13 +65,16 @@ def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
 
 
 def _complex(point: Point) -> bool:
-    """Tell whether the deciding multiplier is the modulus of a complex pair."""
+    """Tell whether the deciding multiplier is the modulus of a complex pair of multipliers."""
     leading = complex(point.cycle.local[0, 0])
     return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
-    """Locate the special point between two neighbours on a branch; None if not reached."""
+    """Locate the special point of this kind between two neighbours on a branch.
+
+    Returns None if a cycle on the way cannot be closed.
+    """
     direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
     if points is None:
@@ -80,7 +84,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
-    """Return the last point between two neighbours on a branch with a stable cycle.
+    """Return the last stable cycle on a branch before a special point between two neighbours.
 
     It lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
     closed.
@@ -100,9 +104,9 @@ def towards(first: Point, second: Point) -> np.ndarray:
 def _enclosed(
     tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
 ) -> dict[float, Point] | None:
-    """Search for a special point between two neighbours on a branch.
+    """Search for a special point between two neighbours on a branch, to a length `precise`.
 
-    Returns all computed points by their place along the branch, or None if a cycle cannot be closed.
+    Returns all computed points by their length along the branch, or None if a cycle cannot be closed.
     """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
@@ -111,9 +115,9 @@ def _enclosed(
     points: dict[float, Point] = {0.0: first, length: second}
 
     def distance(place_along: float) -> float:
-        """Return how far the multiplier is from its special value at a place along the branch.
+        """Return how far the multiplier is from its special value, at a length along the branch.
 
-        Raises Unreached.
+        The difference has a sign. Raises Unreached.
         """
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
@@ -132,13 +136,13 @@ def _enclosed(
 
 
 class Unreached(Exception):
-    """Error: no cycle was found at a place on a branch."""
+    """Error: no cycle could be closed at some length along a branch."""
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
-    """Return the slope of the multiplier's signed difference along the branch.
+    """Return how fast the multiplier passes its special value, per length along the branch.
 
-    It is taken from the two points nearest to zero.
+    It is taken from the two points nearest to that value. `points` are sorted by their length along the branch.
     """
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
@@ -147,7 +151,7 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
 def _special_point(
     tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
 ) -> LocatedPoint:
-    """Make a special point with its error.
+    """Make a special point of a cycle on a branch, and compute its error.
 
     The error is infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
     """
@@ -183,8 +187,8 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
     """Locate a flip or torus by a curve through the multipliers of orbits near a first guess.
 
     Where a limiter chatters, multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key
-    are used. The error bound is that of the curve, or the distance to the first guess if larger. Returns None if it is
-    unknown.
+    are used. The error bound is that of the curve, or the distance to the first guess if larger. Returns None if the
+    point cannot be located.
     """
     orbits = _beside(tracer, guess, ALONG, tracer.hundredth(guess.place))
     places = np.array([point.place for point in orbits])
@@ -196,7 +200,8 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
     """Locate a fold by a curve through orbits near a first guess, along a direction.
 
     Where a limiter chatters, each multiplier is an average over a range of distances, and passes 1 beside the fold. The
-    error bound is that of the curve, or the distance to the first guess if larger. Returns None if it is unknown.
+    error bound is that of the curve, or the distance to the first guess if larger. Returns None if the fold cannot be
+    located.
     """
     orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
     lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
@@ -205,7 +210,10 @@ def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | No
 
 
 def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
-    """Return orbits on either side of a point of a branch, along a direction, within `reach`."""
+    """Return orbits on both sides of the orbit `guess`, in steps along a branch, up to `reach`.
+
+    `direction` (3,) is that of the branch, in the space of place, log distance and log time.
+    """
     settings = ContinuationSettings.current()
     orbits: list[Point] = []
     for way in (-1.0, 1.0):
@@ -228,9 +236,9 @@ def corrected(
 ) -> LocatedPoint | None:
     """Find the special point along a direction from an origin by the secant method.
 
-    It lies at most `reach` away. The space is place, log distance and log time. The search starts from a nearby cycle,
-    its approximate `states` (1, states), and the `slope` of the multiplier if known. Returns None if there is no such
-    point.
+    It lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log time. The
+    search starts from the cycle `near` it, its approximate `states` (1, states), and the `slope` of the multiplier if
+    known. Returns None if there is no such point.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
@@ -253,13 +261,19 @@ def corrected(
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
-    """Locate all points of a branch at which a multiplier passes the unit circle."""
+    """Locate all points of a branch where a multiplier passes the unit circle.
+
+    A fold at which asymmetric cycles only meet the symmetric one is left out.
+    """
     specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [special for special in specials if special and not _meets_symmetric(tracer, special)]
 
 
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
-    """Tell whether an apparent fold of an asymmetric branch meets the symmetric branch there."""
+    """Tell whether a fold is in fact where an asymmetric branch meets the symmetric one.
+
+    There the middle of the cycle lies on the reference.
+    """
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
     stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))

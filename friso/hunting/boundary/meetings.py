@@ -27,9 +27,9 @@ MeetingKind = Literal["cross", "together", "end"]
 class Meeting:
     """Meeting of two curves in a plane; a curve that crosses itself has its number twice.
 
-    `places` in the box of the keys have the shape (1, 2), or (2, 2) for both ends of a stretch. `error` is their error
-    along each key (infinite: not refined). `same_cycle` tells whether both curves are changes of one cycle, or of two
-    cycles of one stage.
+    `places` are coordinates in the box of the keys, 0 to 1 along each: shape (1, 2), or (2, 2) for both ends of a
+    stretch. `error` is their error along each key (infinite: not refined). `same_cycle` is true if both curves are
+    changes of one cycle, false for two cycles of one stage.
     """
 
     curves: tuple[int, int]
@@ -40,9 +40,10 @@ class Meeting:
 
 
 def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
-    """Find where curves meet; crossings are refined by cycles closed to a relative tolerance.
+    """Find where curves cross, run together or end on one another.
 
-    A crossing or an end within a stretch that runs together, or at another crossing, does not count as well.
+    Crossings are refined by cycles closed to the relative tolerance `rtol`. Within a stretch that runs together, or at
+    another crossing, a further crossing or end does not count.
     """
     meetings: list[Meeting] = []
     for first, second in combinations(range(len(curves)), 2):
@@ -57,7 +58,7 @@ def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[M
 
 
 def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
-    """Tell whether a place, shape (2,), belongs to a meeting: it is near its point or stretch."""
+    """Tell whether a place in the box, shape (2,), lies at a meeting: near its point or stretch."""
     path = np.vstack([meeting.places, meeting.places[-1:]])
     shares = leg_shares(path, place)
     away = np.linalg.norm(path[:-1] + shares[:, None] * np.diff(path, axis=0) - place, axis=1).min()
@@ -72,9 +73,9 @@ def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
 
 
 class _Nearest(NamedTuple):
-    """Point of a curve nearest to a place, at the distance `away`.
+    """What is nearest on a curve to some point: the distance `away`, and the cycle there.
 
-    `cycle` holds log amplitude and log period of the cycle there, shape (2,).
+    `cycle` holds log amplitude and log period of the cycle, shape (2,).
     """
 
     away: float
@@ -82,7 +83,10 @@ class _Nearest(NamedTuple):
 
 
 def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
-    """Project a place, shape (2,), on the straight lines between the points of a curve."""
+    """Find what is nearest on a curve to coordinates in the box, shape (2,).
+
+    The curve is straight between its points.
+    """
     path, spots = _closed_path(curve)
     sizes = np.array([_size(spot) for spot in spots])
     shares = leg_shares(path, at)
@@ -92,7 +96,7 @@ def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
 
 
 def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return where on each leg of a path, (n, 2), the point nearest to a place, (2,), lies.
+    """Return where on each leg of a path, (n, 2), the point nearest to `at`, shape (2,), lies.
 
     The results run from 0 at the start of a leg to 1 at its end.
     """
@@ -107,16 +111,16 @@ def _size(spot: Spot) -> np.ndarray:
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
-    """Tell from log amplitude and log period whether two cycles are the same.
+    """Tell from log amplitude and log period, shape (2,), whether two cycles are the same.
 
-    The period-doubled form of a cycle counts as the same.
+    A cycle of twice the period counts as the same.
     """
     size, period = np.abs(one - other)
     return bool(max(size, min(period, abs(period - np.log(2)))) < MeetingSettings.current().same_cycle_log)
 
 
 def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Meeting]:
-    """Find stretches over which the second curve repeats the first, with the same cycle.
+    """Find stretches over which curve `second` repeats curve `first`, with the same cycle.
 
     This happens where a curve was lost and then followed again. A curve that crosses at an angle stays near over a
     shorter stretch.
@@ -135,7 +139,7 @@ def _stretches(curves: Sequence[Curve], first: int, second: int) -> Iterator[Mee
 
 
 def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], rtol: float) -> Iterator[Meeting]:
-    """Find where two curves cross, or one crosses itself."""
+    """Find where two curves cross, or one crosses itself if both `numbers` are equal."""
     first, second = (curves[number] for number in numbers)
     (path, spots), (other_path, other_spots) = _closed_path(first), _closed_path(second)
     legs, others = np.diff(path, axis=0), np.diff(other_path, axis=0)
@@ -168,10 +172,10 @@ def _refined(
     pairs: Sequence[Sequence[Spot]],
     rtol: float,
 ) -> Meeting:
-    """Refine a crossing from a guess between two neighbouring points of each curve.
+    """Refine a guessed crossing; `pairs` are the neighbouring points of each curve about it.
 
     The next guess is where the tangents of both curves cross. The first guess is returned if a cycle is lost on the
-    way, or if a limiter chatters, because one point then costs as much as many.
+    way. It is also returned if a limiter chatters, because one point then costs as much as many.
     """
     settings, place = MeetingSettings.current(), guess
     refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
@@ -201,9 +205,9 @@ def _refined(
 
 
 def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
-    """Return a curve's direction after the step `chord` to another point.
+    """Return a curve's new direction after a step, `chord`, from one of its points to another.
 
-    It is unchanged if the step hardly follows the curve.
+    The direction `way` stays if the step hardly follows the curve.
     """
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
     settings = MeetingSettings.current()

@@ -57,7 +57,7 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
     """Find all curves in the plane of two keys on which the hunting cycle stops attracting.
 
     Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between
-    `nodes` x `nodes` stages. Orbits are closed to a relative tolerance.
+    `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
     """
     nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
     points = space.grid(nodes)
@@ -99,10 +99,10 @@ def _sought(
     rtol: float,
     tally: Tally,
 ) -> tuple[list[Curve], list[np.ndarray]]:
-    """Follow the edge of hunting between neighbours of which only the first has the cycle.
+    """Follow the edge of hunting between grid neighbours of which only the first has the cycle.
 
-    Returns the curves, and the places where no curve could be begun. `changing` are pairs of neighbours, and `allowed`
-    the numbers of the valid stages among all points (points, 2).
+    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours, and
+    `allowed` the numbers of the valid stages among all `points`, shape (points, 2).
     """
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
@@ -123,13 +123,13 @@ def _sought(
 
 
 CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
-"""Cycles, and the numbers of the stages on one side of a curve and on the other."""
+"""Cycles, and the numbers of the stages inside and outside of a curve on which they change."""
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
-    """Return the hunting cycles of stages, and the searches for curves to make.
+    """Return the hunting cycles of stages, and the searches for curves on which they change.
 
-    A stage for which no cycle could be closed is on neither side.
+    A stage for which no cycle could be closed is neither inside nor outside of a curve.
     """
     hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain
@@ -172,7 +172,8 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """Follow a cycle towards a neighbouring stage, to where it loses stability or folds.
 
-    Returns that point, or None, and whether the cycle reaches the neighbour unchanged.
+    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change, or None,
+    and whether the cycle reaches the neighbour unchanged.
     """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))

@@ -15,17 +15,17 @@ from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 
 GENERIC = 0.4721359549995794
-"""An irrational place, at which no key has a special value."""
+"""Irrational position in a key's range, from 0 to 1, at which no key has a special value."""
 
 FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
-"""Function that turns arrays of values, by name, into flat keys of stages (SI)."""
+"""Function that turns arrays of values, by name, into the keys of stages with SI values."""
 
 
 @dataclass(frozen=True)
 class KeyRange:
     """Range of a key, or of a variable that keys depend on, from `low` to `high` [SI `unit`].
 
-    The scale is logarithmic if `log`.
+    A place in the range runs from 0 to 1, evenly in the value, or in its logarithm if `log`.
     """
 
     key: str
@@ -35,19 +35,19 @@ class KeyRange:
     unit: str = ""
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """Return the values [SI] at places: `low` at 0 and `high` at 1."""
+        """Return the values [SI] at places: `low` at place 0 and `high` at 1."""
         if self.log:
             return self.low * (self.high / self.low) ** place
         return self.low + (self.high - self.low) * place
 
     def place(self, value: np.ndarray) -> np.ndarray:
-        """Return the places of values [SI]."""
+        """Return the places of values [SI], from 0 at `low` to 1 at `high`."""
         if self.log:
             return np.log(value / self.low) / np.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def hundredth(self, place: float) -> float:
-        """Return the change of place that changes the value there by one per cent.
+        """Return by how much the place changes where the value changes by one per cent.
 
         If the range contains 0, it is one per cent of the larger end.
         """
@@ -82,7 +82,7 @@ class Space:
     def form(self) -> Structure:
         """Return the structure shared by all stages in the box.
 
-        It is that of a stage at which no key is zero or a whole number. Simpler stages, with a stroke of zero or a
+        It is taken from a stage at which no key is zero or a whole number. Simpler stages, with a stroke of zero or a
         whole exponent, use it too.
         """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
@@ -101,19 +101,19 @@ class Space:
         return ~np.any([np.zeros(len(points), bool), *broken], axis=0)
 
     def lines(self, origins: np.ndarray, directions: np.ndarray) -> Family:
-        """Return the family of stages along lines through the box.
+        """Return a function that makes the stages at places along lines through the box.
 
         Lines have origins (count, keys) and directions (count, keys).
         """
 
         def family(which: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at places along the lines with these numbers."""
+            """Return the stages on the lines numbered `which`, at `places` along them."""
             return self.stages(origins[which] + places[:, None] * directions[which])
 
         return family
 
     def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
-        """Return a function of place: the length of line over which a key changes by one per cent.
+        """Return a function that tells, at a place on a line, over what length a key changes by 1 %.
 
         The key that changes fastest counts. The line runs through the box from an origin (keys,) along a direction
         (keys,).

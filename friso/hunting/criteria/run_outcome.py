@@ -30,7 +30,7 @@ RESTS: Final = "rests"
 FAILED: Final = "failed"
 
 OUTCOMES = (SWINGS, CREEPS, RESTS, FAILED)
-"""The words, the worst first."""
+"""All words for an outcome; the order decides which of two counts as worse."""
 
 BAND = 1e-5
 """Band [m] about the reference within which a run of a sweep rests: friso's choice, the wider one of
@@ -68,14 +68,14 @@ def lasts(
 ) -> np.ndarray:
     """Return which runs still swing by more than twice the `band` [m] without decaying.
 
-    The peak-to-peak `swing` [m] must also be at least `lasting` times the `earlier` one [m]. A run that is long enough
-    for any transient to decay passes 0 as `earlier`.
+    The peak-to-peak `swing` [m] must also be at least `lasting` times the `earlier` one [m]. Pass 0 as `earlier` for a
+    run long enough for any transient to decay.
     """
     return (swing > 2 * np.asarray(band)) & (swing >= lasting * np.asarray(earlier))
 
 
 def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the word of `OUTCOMES` for every run, shape (runs,).
+    """Return swings, creeps, rests or failed for every run, shape (runs,).
 
     A run rests if it left the band [m] for the last time more than `hold` [s] before its end.
     """
@@ -96,8 +96,8 @@ def end_of_traces(
 ) -> End:
     """Describe how sampled runs end: deviations [m], (runs, n), over times [s], (n,).
 
-    All runs count as `completed` unless given; their references stand from the `corner` [s] on. A run outside the band
-    at its last sample was outside when it ended.
+    All runs count as `completed` unless an array says otherwise; their references stand from the `corner` [s] on. A run
+    outside the band [m] at its last sample was outside when it ended.
     """
     runs = len(deviation)
     ended = np.full(runs, time[-1])
@@ -115,7 +115,8 @@ def end_of_traces(
 def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.ndarray:
     """Return the last time [s] at which deviations were outside the band [m], (runs,).
 
-    NaN counts as outside; -inf if they never were. The deviations [m] have the shape (runs, n), the times [s] (n,).
+    NaN counts as outside; the result is -inf if they never were. The deviations [m] have the shape (runs, n), the times
+    [s] (n,).
     """
     outside = ~(np.abs(deviation) <= band)
     last = len(time) - 1 - outside[:, ::-1].argmax(axis=1)

@@ -23,24 +23,24 @@ BandName = Literal["inner", "outer"]
 def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
     """Return the settling times [s] of a chunk of runs into one of their bands, shape (runs,).
 
-    `flat` are the keys of the stages; arrays have one entry per run of the chunk. Runs that were not completed get a
-    time as well.
+    `flat` has the keys of the stages, such as "friction.static", in SI; arrays have one entry per run of the chunk.
+    Runs that were not completed get a time as well.
     """
     return _longest(_at_stands(flat, runs, band))
 
 
 def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
-    """Return the settling times [s] of runs at the reference's last place, (runs,).
+    """Return the settling times [s] of runs at the last place of the reference, shape (runs,).
 
-    The verdict on a stage needs no other place (see `settling_of_runs`).
+    The verdict on a stage needs no other place. `flat` has the keys of the stages in SI.
     """
     return _at_stands(flat, runs, band)[-1]
 
 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
-    """Return settling times [s] of runs at the places the reference leaves, and at its last.
+    """Return settling times [s] at the places that the reference leaves, and at its last place.
 
-    The first is the longest over all places that the reference leaves.
+    The first of both arrays has the longest time over all places that the reference leaves.
     """
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))
@@ -48,7 +48,7 @@ def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.n
 
 
 def settling_of_traces(places: list[Stand], time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:
-    """Return the settling times [s] of sampled runs at each place of the reference, (runs,).
+    """Return the longest settling time [s] of sampled runs over the reference's places, (runs,).
 
     The deviations [m] have the shape (runs, n), the times [s] (n,). A run has settled at the sample after the last one
     outside of the band, `within` [m].

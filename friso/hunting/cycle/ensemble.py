@@ -19,18 +19,18 @@ from friso.hunting.cycle.settings import OrbitSettings
 from friso.stage.transmission import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
-"""Cached properties of an ensemble with one row per stage."""
+"""Cached properties of an ensemble that have one row per stage."""
 
 OF_ALL = ("structure", "kernel")
-"""Cached properties of an ensemble that all its stages share."""
+"""Cached properties of an ensemble that are common to all its stages."""
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
+    """Stages of one structure, as a mapping of keys to SI numbers or arrays of shape (count,).
 
-    `form` is the structure, given where the first stage alone does not show it. `threads` bounds the threads of runs;
-    `cancel` is a flag that stops runs (see `RunOptions`).
+    `flat` has the keys, such as "friction.static". `form` is the structure, given where the first stage alone does not
+    show it. `threads` bounds the threads of runs; `cancel` is a flag that stops runs (see `RunOptions`).
     """
 
     flat: Mapping[str, Any]
@@ -85,7 +85,7 @@ class Ensemble:
 
     @cached_property
     def symmetric(self) -> np.ndarray:
-        """Tell which stages have mirror-image motions, shape (count,), tested on random states."""
+        """Return which stages have mirror-image motions, shape (count,), tested on random states."""
         states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
         pairs = ((self.rates(family), self.rates(-family)) for family in states)
         return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
@@ -96,10 +96,10 @@ class Ensemble:
         return self.kernel.values({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, self.count)
 
     def number(self, name: str) -> np.ndarray:
-        """Return a quantity of every stage by the `name` of its generated function, shape (count,).
+        """Return a quantity of every stage, shape (count,), by its `name` among compiled functions.
 
-        "rate" [1/s] is the natural frequency of mass and loop, "breakaway" [N] the largest friction force at rest, and
-        "stiffness" [N/m] the proportional stiffness of the loop.
+        "rate" [1/s] is the natural frequency of mass and loop, and "breakaway" [N] the largest friction force at rest.
+        "stiffness" [N/m] is the proportional stiffness of the loop.
         """
         (value,) = getattr(self.kernel.module, name)(self.values)
         return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
@@ -160,7 +160,7 @@ class Ensemble:
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state per displacement [s] that relaxes the actuator, (count,).
+        """Return the integrator state at which the actuator relaxes, per displacement [s], (count,).
 
         The actuator then exerts the force that it exerts at the reference.
         """
@@ -176,10 +176,10 @@ class Ensemble:
         return np.where(np.abs(carrying) < self.number("breakaway"), 0.0, carrying) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
-        """Return the imbalance of integrator and constant forces of sticking stages, (count,).
+        """Return how far the integrators of sticking stages are from balancing constant forces.
 
-        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), or (n,
-        states) for the stage `number` alone; then the result has the shape (n,).
+        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), and the
+        result (count,). For the stage `number` alone, they are (n, states) and (n,).
         """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]
@@ -192,7 +192,10 @@ class Ensemble:
         return held - free
 
     def rates(self, states: np.ndarray) -> np.ndarray:
-        """Return the time derivative of the states, both of shape (count, states)."""
+        """Return the time derivatives of the states, both of shape (count, states).
+
+        The reference stands at zero.
+        """
         modes = self.kernel.modes(states.T, 0.0, np.zeros(3), self.values)
         return columns(self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values), self.count)
 
@@ -216,11 +219,12 @@ class Ensemble:
         along: tuple[str, ...] = (),
         **run_options: Any,
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`.
+        """Run each stage from its state in `starts` for its duration [s].
 
-        A run begins in the modes that belong to its state. The `ends` of the result are states alone, or with the modes
-        if `with_modes`. Deviations may be `along` keys (see `KernelRequest`), by the values of the flat keys. Turning
-        points are kept only with `least_swing`, because a limiter that chatters makes too many.
+        A run begins in the switched modes that belong to its state. The `ends` of the result are states alone, or with
+        the modes if `with_modes`. With `variational`, deviations from the run are integrated too; they may be `along`
+        keys (see `KernelRequest`), by the values of the stage's keys. Turning points are kept only with `least_swing`,
+        because a limiter that chatters makes too many. `run_options` are fields of `RunOptions`.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)

@@ -31,13 +31,13 @@ NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
-"""Reasons for not finding a cycle that do not exclude one."""
+"""Reasons for finding no cycle that leave open whether there is one."""
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which a deviation changes by the factor e.
+    """Return the time [s] in which a deviation from a cycle changes by the factor e.
 
-    `multiplier` acts once per time `returned` [s].
+    The `multiplier` acts once per time `returned` [s].
     """
     return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
 
@@ -94,7 +94,7 @@ class Cycles(ArrayRows):
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return the arrays with one row per stage, by name."""
+        """Return all arrays that have one row per stage, by the names of their fields."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("sign", "swings")}
 
 
@@ -102,7 +102,8 @@ class Cycles(ArrayRows):
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
     """Find the symmetric cycle of every stage with symmetric equations.
 
-    It is its own mirror image after half a period.
+    Such a cycle is its own mirror image after half a period. `positive` is the return map of stages that stick on the
+    positive side (None: it is computed).
     """
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
@@ -112,7 +113,8 @@ def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     """Find one hunting cycle of every stage, stable or not.
 
     For a symmetric stage it is the symmetric cycle, with the multiplier of half a period; for others the multiplier is
-    that of a whole period. `sign` is 0 if there are both kinds of stage. Orbits are closed to a relative tolerance.
+    that of a whole period. `sign` is 0 if there are both kinds of stage. Orbits are closed to the relative tolerance
+    `rtol`.
     """
     symmetric = stages.symmetric
     kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
@@ -130,10 +132,10 @@ def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
 
 
 def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
-    """Find the cycles that the return maps suggest.
+    """Find the cycles that the return maps of stages suggest.
 
-    Symmetric stages give the symmetric cycle and one of an asymmetric pair. If any stage is not symmetric, there is one
-    cycle over a whole period.
+    If all stages are symmetric, the result has two entries: their symmetric cycles, and one of each asymmetric pair. If
+    any stage is not, the only entry has cycles over a whole period.
     """
     positive = return_map(stages, COARSE_RTOL)
     if stages.symmetric.all():
@@ -145,7 +147,7 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
     """Find one of the pair of asymmetric cycles of each symmetric stage, if it has one.
 
-    The return map suggests the cycle. The other of the pair is its mirror image.
+    `positive` is the return map, which suggests the cycle. The other cycle of the pair is its mirror image.
     """
     settings = OrbitSettings.current()
     cycles = _closed(stages, whole_guess(stages, positive, positive, settings.least_asymmetry_share), 1.0, rtol)
@@ -158,14 +160,17 @@ def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL)
 def whole_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
     """Find the cycle of every stage over a whole period, for stages that need not be symmetric.
 
-    `positive` is the return map of stages that stick on the positive side.
+    `positive` is the return map of stages that stick on the positive side (None: it is computed).
     """
     positive = positive or return_map(stages, COARSE_RTOL)
     return _closed(stages, whole_guess(stages, positive, return_map(stages, COARSE_RTOL, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
-    """Close cycles near guesses, from several variants of each guess in turn."""
+    """Close cycles near guesses, from several variants of each guess in turn.
+
+    `sign` is -1 for half a period of symmetric cycles, 1 for whole periods.
+    """
     count, size = stages.count, len(stages.kernel.states)
     orbits = Orbits(
         np.full((count, size), np.nan),
@@ -189,19 +194,22 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 
 def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
-    """Return which orbits stick near the guessed distances [m], shape (count,)."""
+    """Return which orbits stick near the guessed `distances` [m], shape (count,)."""
     return np.abs(orbits.states[:, stages.sticking] / distances - 1) < OrbitSettings.current().kept_distance_share
 
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
-    """Copy the trial orbits that are closed near their guess into `orbits`."""
+    """Copy trial orbits that were closed near their guess into the rows `which` of `orbits`."""
     good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
-    """Close orbits from the end of a long simulation, where the simulation repeats."""
+    """Close orbits that are still open from the end of a long simulation that repeats itself.
+
+    The closed ones are copied into `orbits`.
+    """
     settings = OrbitSettings.current()
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
@@ -230,9 +238,9 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray | str = NOT_CLOSED) -> Cycles:
-    """Make cycles from closed orbits: compute size and multipliers.
+    """Make cycles from orbits: compute size, multipliers and stability of the closed ones.
 
-    `reasons` are given to the orbits that are not closed.
+    `reasons` say why the others are not closed.
     """
     which = np.flatnonzero(orbits.closed)
     subset, shut = stages.take(which), orbits.take(which)

@@ -29,7 +29,7 @@ class Guess:
 
 
 def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
-    """Guess the symmetric cycle from the return map.
+    """Guess the symmetric cycle from the return map `positive` of stages on the positive side.
 
     It is the largest distance from which a stage lands equally far on the other side. There the return map falls
     through its diagonal.
@@ -76,9 +76,10 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
     """Return the distance, among those numbered `goes`, that recurs after two landings.
 
-    If there is none, the distance that almost returns is taken: near a fold both fixed points lie between two points of
-    the map. With `apart`, places near the symmetric fixed point are left out, because the map almost returns there
-    whenever a flip is near. Returns None without a guess.
+    From the distances `start` a stage lands at `far`, and then at `end` [m], each of shape (points,). If no distance
+    recurs, the one that almost does is taken: near a fold both fixed points lie between two points of the map. With
+    `apart`, distances near the symmetric fixed point are left out, because the map almost returns there whenever a flip
+    is near. Returns None without a guess.
     """
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0
@@ -101,9 +102,9 @@ def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the last two neighbouring distances between which a function falls through zero.
+    """Return the last two neighbouring distances between which `rise` falls through zero.
 
-    Both are NaN if there are none.
+    `distances` and `rise` have the shape (count, points). Both results are NaN if there are none.
     """
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
@@ -113,9 +114,9 @@ def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
-    """Return the distance at which a function falls through zero.
+    """Return the last distance at which `rise` falls through zero, shape (count,).
 
-    It is interpolated linearly between two distances.
+    It is interpolated linearly between two distances. `distances` and `rise` have the shape (count, points).
     """
     low, high = _falling(distances, rise)
     above, below = _interpolated(low, distances, rise), _interpolated(high, distances, rise)
@@ -123,5 +124,5 @@ def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
 
 
 def _interpolated(at: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Interpolate linearly between the points x, y (count, points), at one place each (count,)."""
+    """Interpolate linearly between the points x, y (count, points), at one x each, (count,)."""
     return np.array([np.interp(*row) for row in zip(at, x, y, strict=True)])

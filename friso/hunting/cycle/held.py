@@ -45,8 +45,8 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
 def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Measure how far stages swing [m] when started beside their orbits, (count, runs, returns).
 
-    Runs first span the range, with the orbit in the middle. More runs follow where, on either side, the next return
-    leaves the range.
+    Runs first start evenly over a range about the orbit. More runs follow where, on either side, the next return leaves
+    the range.
     """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.held_range_share, settings.held_range_share, settings.held_runs)
@@ -61,7 +61,7 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the deviations that motions have after many returns within a map's range.
+    """Return at which deviations motions remain that a return map keeps within its range.
 
     The map takes the deviations `before` a return to those `after` it, each of shape (runs,). The result ascends. A
     motion that grew at every return is left out: near a multiplier of 1 or -1 it merely leaves slowly.

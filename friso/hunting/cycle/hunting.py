@@ -53,7 +53,7 @@ LAGS = "its controller pushes ever harder at standstill, as an integral does, an
 """Reason given when a lag that replaces the integral may make a stage hunt."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
-"""Reason given when an observed swing may grow without bound, as the loop is unstable at lower gains."""
+"""Reason given when a swing may grow without bound, as the loop is unstable at lower gains."""
 
 MAY_GROW = "without anti-windup it is not known whether large swings grow: a size is where a run was stopped"
 """Reason given when stability at lower gains is unknown, so that an observed swing may grow."""
@@ -159,10 +159,10 @@ class Hunting:
 
     - `cycles`: limit cycles, the stable ones first.
     - `reason`: why there are none, or why the answer is not `certain`.
-    - `certain`: every simulation that had to decide was completed.
+    - `certain`: no simulation left open what attracts the stage, and nothing can attract it beyond the range searched.
     - `returns`: return map of the stage sticking on the positive side (None: the stage cannot hunt).
     - `observed`: attracting swings that are none of the cycles.
-    - `target`: motion in which all motions end that do not come to rest (None: all come to rest).
+    - `target`: how far and how late a run must swing to count as hunting (None: nothing attracts).
     - `surveyed`: the survey of the stage.
     - `lower_gains`: stability of the loop far beyond a force limit without anti-windup (None: no such limit). Unless it
       is "stable", large motions may diverge, and an observed swing may be `passing`.
@@ -218,8 +218,9 @@ def why_not(form: Structure) -> str:
 def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """Find the limit cycles and other attractors of a stage, whatever its own motion.
 
-    Cycles are closed to a relative tolerance. The search may use so much `work` (see `friso.engine.allowance`);
-    anything open by then is not certain. Raises InputError for a tolerance that is not usable.
+    Cycles are closed to the relative tolerance `rtol`. The search may use so much `work` (see
+    `friso.engine.allowance`); anything open by then is not certain. Raises InputError for a tolerance that is not
+    usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
@@ -254,10 +255,10 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 
 
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
-    """Return for which stages the attractors are certain, shape (count,).
+    """Return for which stages it is certain what attracts them, shape (count,).
 
-    They are if the survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not surveyed
-    (None), and are certain if no other swing lasts.
+    It is certain if the survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not
+    surveyed (None), and are certain if no other swing lasts.
     """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
@@ -303,7 +304,7 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    A cycle fed by friction that falls with speed has an amplitude in a certain ratio to this fall
+    The amplitude of a cycle lies in a certain ratio to the fall of friction with speed that feeds it
     (`feeding_ratio_range`). It is stable where friction falls more slowly than cycles grow.
     """
     settings = OrbitSettings.current()
@@ -315,7 +316,10 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
-    """Apply `small_cycles_possible` to stages that all have friction, (count,)."""
+    """Return which stages may have cycles smaller than the survey covers, shape (count,).
+
+    All stages must have friction.
+    """
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * settings.least_certain_swing, settings.least_certain_swing, 60)
@@ -349,7 +353,7 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
-    """Make one cycle of a stage ready for display, with one period in time."""
+    """Make one cycle of a stage ready for display, with signals over one period."""
     slope = cycles.slope if stages.chatters else slopes(stages, cycles.orbits, cycles.direction, rtol)
     return Cycle(
         symmetric=cycles.sign < 0,
@@ -367,7 +371,10 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
 
 
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
-    """Return the growth of a small deviation from a cycle per return, from a simulation."""
+    """Return by what factor a small deviation from a cycle grows per return, from a simulation.
+
+    The result is NaN if too few deviations stay small.
+    """
     settings = OrbitSettings.current()
     away = np.array([[0.0, settings.beside_cycle_share, -settings.beside_cycle_share]])
     heights = returns_of(

@@ -21,8 +21,9 @@ class Multipliers:
     """Floquet multipliers of orbits, without the trivial one along the cycle.
 
     `local` (count, states - 1) has the largest first. `direction` (count, states) is the eigenvector of the first,
-    scaled to a position of 1. `slope` (count,) is the slope of the return map along that direction over a finite range,
-    NaN where no limiter chatters. `high` and `low` [m] (count,) are the extremes of the position on the orbit.
+    scaled to a position of 1. `slope` (count,) is the slope of the return map along that direction over a finite range.
+    It is only computed where a limiter may chatter, and NaN elsewhere. `high` and `low` [m] (count,) are the extremes
+    of the position on the orbit.
     """
 
     local: np.ndarray
@@ -35,7 +36,8 @@ class Multipliers:
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     """Compute the multipliers of closed orbits, one orbit per stage.
 
-    Runs have a relative tolerance. Multipliers belong to half a period if the orbits were closed over half a period.
+    Runs have the relative tolerance `rtol`. Multipliers belong to half a period if the orbits were closed over half a
+    period.
     """
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
@@ -46,7 +48,11 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return multipliers and leading directions of the flow at constant integrator state."""
+    """Compute the multipliers of orbits, and the direction in which the largest one acts.
+
+    Deviations are compared at equal states of the integrator. `flows` (count, states, states) are derivatives of final
+    by initial states, and `rates` (count, states) time derivatives at the end.
+    """
     phase = stages.integral
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
@@ -63,7 +69,7 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
 def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Return the slope of the return map over a small range about the orbits, shape (count,).
 
-    Runs start along a direction (count, states); a straight line is fitted to their returns.
+    Runs start beside the orbits along a direction (count, states); a straight line is fitted to their returns.
     """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]

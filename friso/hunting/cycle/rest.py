@@ -25,10 +25,11 @@ def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float 
 
 
 def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np.ndarray:
-    """Return stuck states as `stuck` does, with the bristles bent by slow travels of the masses.
+    """Return states of stages stuck at displacements [m], with bristles bent by earlier travels.
 
-    The `travels` [m], each of shape (count,), follow one another, and bend bristles no farther than break-away does.
-    With several bristles some may stick while others slip, so that the distance alone does not decide what follows.
+    The `travels` [m], slow and each of shape (count,), follow one another, and bend bristles no farther than break-away
+    does. With several bristles some may stick while others slip, so that the distance alone does not decide what
+    follows.
     """
     states, bristles = stuck(stages, displacement), stages.kernel.having(Role.BRISTLE)
     most = stages.scales[:, bristles]
@@ -50,8 +51,8 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Return the time [s] in which the integrator winds up to break-away, (count,).
 
-    The stage sticks meanwhile. If the integrator pauses, it is a time in which the loop moves. It is at most the time
-    that an integrator with a leak takes.
+    The stage sticks meanwhile, at a `displacement` [m]. If the integrator pauses, the result is one period of the
+    loop's natural frequency. With a leak it is at most a few time constants of the leak.
     """
     settings = OrbitSettings.current()
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)

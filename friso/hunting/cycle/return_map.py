@@ -55,7 +55,7 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
 def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
     """Release every stage from each distance [m], (count, points), and measure its first swing.
 
-    Distances ascend.
+    Distances ascend; `side` is 1 or -1, the side of the reference from which stages start.
     """
     settings = OrbitSettings.current()
     shape = distances.shape

@@ -38,7 +38,7 @@ class OrbitSettings(Settings):
     """Distances on which a fixed point of the map is narrowed down before Newton's method begins."""
 
     unwinding_wait_share: float = setting(0.4, "waits")
-    """Time from landing until the actuator only balances constant forces, as a fraction of the wait."""
+    """Time from a stop until the actuator only balances constant forces, as a fraction of the wait."""
 
     almost_return_log: float = setting(0.03, "")
     """Largest error of a return that serves as the guess of a cycle."""
@@ -159,4 +159,4 @@ class OrbitSettings(Settings):
     """Change of place for a numerical derivative. If smaller it is rounding; if larger it includes curvature."""
 
     swing_leg_share: float = setting(0.5, "of the distance")
-    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing after landing."""
+    """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""

@@ -1,6 +1,6 @@
-"""Close periodic orbits by Newton's method on the flow.
+"""Close periodic orbits by Newton's method.
 
-The flow runs over a period, or over half a period and the mirror image.
+Each run covers a period, or half a period, after which it must have reached the mirror image of its start.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Orbits(ArrayRows):
 
     `states` (count, states) has one state of each orbit. `times` [s] (count,) is the time after which the orbit returns
     to that state, or to its mirror image if `sign` is -1. `gaps` (count,) is the remaining error relative to the
-    states' magnitudes. `closed` (count,) tells whether Newton's method converged. `swings` counts swings in that time:
-    one in half a period of the simplest cycles, two in a whole one.
+    states' magnitudes. `closed` (count,) is true if Newton's method converged. `swings` counts swings in that time: one
+    in half a period of the simplest cycles, two in a whole one.
     """
 
     states: np.ndarray
@@ -95,8 +95,8 @@ def close(
     default as few as possible. The phase is fixed at the instant at which the integrator balances the constant forces
     on a stage at rest.
 
-    A Jacobian is kept for as long as steps with it shrink the gap fast. Where a limiter chatters, the flow's derivative
-    changes from one nanometre to the next, so the last Jacobian, from farther away, is kept.
+    A Jacobian is used again for as long as steps with it shrink the gap fast. Where a limiter chatters, the derivative
+    of the motion changes from one nanometre to the next, so the last Jacobian, from farther away, is kept.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
@@ -115,14 +115,14 @@ class Border:
 
 
 Family = Callable[[np.ndarray, np.ndarray], Ensemble]
-"""Stages as a function of their numbers (count,) and of one place each (count,)."""
+"""Function that makes stages from the numbers of lines and one place on each, both (count,)."""
 
 
 class Followed(NamedTuple):
-    """Orbits, the places of their stages, and the Jacobians with which they were closed.
+    """Orbits, the places of their stages along a line of keys, and the last Jacobians.
 
-    The Jacobians, shape (count, states + 2, states + 2), start the search for nearby orbits. They are NaN where a
-    limiter chatters, because they change too fast there.
+    The Jacobians, shape (count, states + 2, states + 2), closed these orbits and start the search for nearby ones. They
+    are NaN where a limiter chatters, because they change too fast there.
     """
 
     orbits: Orbits
@@ -141,12 +141,13 @@ def close_along(
     swings: int | None = None,
     jacobians: np.ndarray | None = None,
 ) -> Followed:
-    """Close orbits as `close` does, while stages move until each orbit lies on its border.
+    """Close orbits while their stages move along lines of keys, until each is on its border.
 
-    The stages move along lines in the keys. The orbits start from states and times [s]. The method passes folds, where
-    no orbit exists at a place beyond. With `jacobians` of closed orbits at or near the start, the first step to the
-    border needs no run. The Jacobians may belong to another line through the keys: further steps learn the derivative
-    along this line.
+    The orbits start from `states` and `times` [s], and their stages from `places` on the lines. The method passes
+    folds, where no orbit exists at a place beyond. With `jacobians` of closed orbits at or near the start, the first
+    step to the border needs no run. The Jacobians may belong to another line through the keys: further steps learn the
+    derivative along this line. `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one, and `swings`
+    counts swings in that time. Runs have the relative tolerance `rtol`.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
@@ -207,7 +208,10 @@ class _Shooting:
         return bool(self.active.any())
 
     def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
-        """Take one step of some orbits, with a new Jacobian or with the last one, from runs at a tolerance."""
+        """Take one step of the orbits numbered `which`, with a new Jacobian or with the last one.
+
+        Runs have the relative tolerance `rtol`.
+        """
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
@@ -230,7 +234,10 @@ class _Shooting:
             self._step(k, np.concatenate([miss, other]), stages.sticking, scale)
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Return derivatives of the misses and of the phase by the states and the time."""
+        """Return derivatives of the closing errors and the phase error by states and time.
+
+        The shape is (orbits, states + 1, states + 1).
+        """
         count, size = shot.ends.shape
         jacobians = np.zeros((count, size + 1, size + 1))
         jacobians[:, :size, :size] = shot.flows - np.eye(size)
@@ -244,7 +251,7 @@ class _Shooting:
         return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Store orbits that are closer than before; stop the ones that are closed, fail or stall."""
+        """Store orbits that are closer to closing than before; stop those that close, fail or stall."""
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -270,9 +277,10 @@ class _Shooting:
         self.gaps[refined], self.idle[refined] = np.inf, 0
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Take a Newton step of limited length for one orbit; return the step.
+        """Take a Newton step of limited length for the orbit numbered `k`; return the step.
 
-        `scales` are the magnitudes of the states.
+        `residual` has the closing errors and the phase error, `scales` the magnitudes of the states. `sticking` is the
+        index of the state that is constant while the stage sticks.
         """
         settings = OrbitSettings.current()
         step, size = self.inverses[k] @ -residual, self.states.shape[1]
@@ -316,7 +324,7 @@ class _Following(_Shooting):
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
     def begin_with(self, jacobians: np.ndarray) -> None:
-        """Start from Jacobians of closed orbits, with a first step to the border."""
+        """Start from Jacobians of closed orbits, with a first step to the border and without a run."""
         self.jacobians = jacobians.copy()
         which = np.arange(len(self.times))
         stages = self.family(which, self.places)
@@ -329,9 +337,9 @@ class _Following(_Shooting):
         self.serves[:] = True
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
-        """Update the Jacobian by the last step, then take the next one.
+        """Update the orbit's Jacobian by what the last step did, then take the next step.
 
-        Broyden 1965, doi:10.2307/2003941.
+        The method is Broyden 1965, doi:10.2307/2003941.
         """
         if latest := self.latest[k]:
             step, before = latest
@@ -352,7 +360,7 @@ class _Following(_Shooting):
         super()._keep_best(which, gaps)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
-        """Set the derivatives of the distance of orbits from their borders."""
+        """Set the last row of Jacobians: the derivatives of an orbit's distance from its border."""
         along, out, late = self.border.normal[which].T
         self.jacobians[which, -1] = 0.0
         self.jacobians[which, -1, stages.sticking] = out / self.states[which, stages.sticking]
@@ -360,9 +368,10 @@ class _Following(_Shooting):
         self.jacobians[which, -1, -1] = along
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        """Return Jacobians by states, time and place along the branch.
+        """Return derivatives of all errors of orbits by state, time and place along the keys' line.
 
-        Where a limiter chatters, the column of the place is kept as long as the closing gap shrinks.
+        The errors are those of closing, of the phase and of the distance from the border. Where a limiter chatters, the
+        column of the place is kept from earlier for as long as the closing error shrinks.
         """
         settings = OrbitSettings.current()
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
@@ -378,7 +387,7 @@ class _Following(_Shooting):
         return self.jacobians[which]
 
     def _beside(self, which: np.ndarray) -> np.ndarray:
-        """Run the orbits of stages slightly before and after their places on the lines.
+        """Run orbits with their stages moved slightly back and ahead along the lines of keys.
 
         Returns the ends and the phase errors, shape (2, orbits, states + 1).
         """

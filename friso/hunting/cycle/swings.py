@@ -22,8 +22,8 @@ class Swings:
 def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
     """Return the first `most` swings of stages that start at rest; a failed run has none.
 
-    Stages start from states (count, states) and run for durations [s] (count,). An extremum counts once the stage has
-    come back by one leg, or the run is over.
+    Stages start from states (count, states) and run for durations [s] (count,). A turning point counts once the stage
+    has come back by a fraction of its start's distance, or the run is over.
     """
     position = starts[:, stages.kernel.position]
     legs = OrbitSettings.current().swing_leg_share * np.abs(position)
@@ -38,8 +38,8 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
     """Return where [m] and when [s] runs turned last, (runs, most), the last swing last.
 
-    Columns before the first swing are NaN. Legs are at least `legs` [m] long, shape (runs,). The swing in which a run
-    ends does not count.
+    Columns before the first swing are NaN. Moves from one turn to the next shorter than `legs` [m], (runs,), do not
+    count, nor does the swing in which a run ends.
     """
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
@@ -55,7 +55,10 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 
 
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
-    """Find the turning points of zigzags column by column, which start on the side `side`."""
+    """Find the turning points of zigzags whose legs are at least `least` [m] long, (runs,).
+
+    `values` [m] and `times` [s] have the shape (runs, points). `side` is 1 or -1 for runs that start on that side.
+    """
     runs = len(values)
     rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))

@@ -1,1 +1,1 @@
-"""Judge hunting by the return map, which gives the next landing from the present one."""
+"""Judge hunting by the return map: from the present sticking distance to the next."""

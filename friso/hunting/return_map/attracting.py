@@ -30,8 +30,8 @@ SCATTERS = "landings at equal distances return differently: the stage remembers 
 class MapSurvey:
     """Result of surveying stages by their return maps.
 
-    `mapped` are the runs, `motions` the stable orbits, `repelling` the unstable ones. A stage is `undecided`, shape
-    (count,), if its map has an attractor that was not closed as a stable orbit.
+    `mapped` are the runs that sample the maps, `motions` the stable orbits, `repelling` the unstable ones. A stage is
+    `undecided`, shape (count,), if its map has an attractor that was not closed as a stable orbit.
     """
 
     mapped: Mapped
@@ -41,9 +41,9 @@ class MapSurvey:
 
     @property
     def doubts(self) -> np.ndarray:
-        """Return why a stage's map does not decide which motions are stable, words (count,).
+        """Return why a stage's map does not decide which motions are stable, texts (count,).
 
-        The word is "" if the map decides.
+        A text is "" if the map decides.
         """
         settings = ReturnMapSettings.current()
         why = np.full(self.mapped.stages.count, "", dtype=object)
@@ -82,7 +82,7 @@ class _Proposal:
 def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
     """Find the attractors of stages by their return maps.
 
-    Orbits are closed to a relative tolerance.
+    Orbits are closed to the relative tolerance `rtol`.
     """
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
@@ -110,9 +110,10 @@ def survey_maps(stages: Ensemble, rtol: float = RTOL) -> MapSurvey:
 
 
 def _left(mapped: Mapped, motions: list[Swinging], repelling: list[Swinging]) -> list[_Proposal]:
-    """Return the attractors of maps that are not closed as orbits yet.
+    """Return the attractors of maps that are not among the closed orbits yet.
 
-    Those without a run near them that can be continued are left out.
+    `motions` are the stable orbits, `repelling` the unstable ones. Attractors without a run near them that can be
+    continued are left out.
     """
     lengths = mapped.stages.length
 
@@ -128,9 +129,9 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """Return the attractors of all maps.
+    """Return the attractors of all maps, each with the run near it that can be continued.
 
-    Each comes with the run of its basin that ended nearest to it.
+    It is the run that leads there and ended nearest to the attractor. Attractors without one are left out.
     """
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):
@@ -150,8 +151,9 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
     """Tell whether an attractor of a map is a given closed cycle of its stage.
 
-    They are compared by size and by number of landings. With `exactly`, the numbers of landings must be equal;
-    otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away force.
+    They are compared by size, and by how often the stage sticks until they repeat. With `exactly`, these numbers must
+    be equal; otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away
+    force.
     """
     distances = np.abs(attractor.distances) * length
     if exactly and not (attractor.periodic and motion.cycles and len(distances) == motion.cycles.swings):
@@ -167,7 +169,7 @@ def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly:
 
 
 def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging], repelling: list[Swinging]) -> None:
-    """Close orbits from runs that repeat; add them to the stable and unstable ones."""
+    """Close orbits from the numbered runs that repeat; add them to `motions` or `repelling`."""
     landings, owners = mapped.landings.take(runs), mapped.owners[runs]
     sizes, times, swings = np.zeros(len(runs)), np.zeros(len(runs)), np.zeros(len(runs), np.int64)
     for k, owner in enumerate(owners.tolist()):
@@ -194,7 +196,8 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     """Return after how many swings a run's last landings repeat; 0 if they do not.
 
-    There are at least `least` swings. `path` has the shape (landings,).
+    At least `least` swings are asked for. `path`, shape (landings,), has the signed landings; those of a `symmetric`
+    stage may repeat on the other side.
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

@@ -19,10 +19,10 @@ PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
     """Return for which stages runs land where the map predicts, in the shape of `numbers`.
 
-    Runs begin stuck at three distances from which the stage rests, at three from which it keeps swinging, and in the
-    widest gap between starts of the map. Each is followed for some landings, at the tolerance of the map and at a
-    hundredth of it. The prediction for a landing starts from the landing before. From the second landing on, every
-    landing must lie within the allowed scatter of its prediction.
+    A stage lands where it sticks after a swing. Runs begin stuck at three distances from which the stage rests, and at
+    three from which it keeps swinging. One more begins in the widest gap between starts of the map. Each is followed
+    for some landings, at the tolerance of the map and at a hundredth of it. The prediction for a landing starts from
+    the landing before. From the second landing on, every landing must lie within the allowed scatter of its prediction.
     """
     begun = [_starts(survey, int(number)) for number in numbers]
     owners = np.repeat(np.arange(len(numbers)), [len(starts) for starts in begun])
@@ -34,7 +34,10 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
 
 
 def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
-    """Return starts of runs of a stage, in deflections of the loop by the break-away force."""
+    """Choose distances at which runs of a stage stick at first, to check its map.
+
+    They are in deflections of the loop by the break-away force, shape (runs,).
+    """
     mapped = survey.mapped
     runs = np.flatnonzero((mapped.owners == stage) & np.isfinite(mapped.starts))
     runs = runs[np.argsort(mapped.starts[runs], kind="stable")]
@@ -52,7 +55,11 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 
 @np.errstate(all="ignore")  # missing landings are NaN
 def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray, rtol: float) -> np.ndarray:
-    """Return which runs, stuck at first at `starts`, land where the maps predict, shape (runs,)."""
+    """Return which runs land where the maps of their stages predict, shape (runs,).
+
+    `owners` are the numbers of their stages. They stick at first at `starts`, in deflections of the loop by the
+    break-away force.
+    """
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     stages = survey.mapped.stages.take(owners)

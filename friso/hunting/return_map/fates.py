@@ -1,6 +1,6 @@
 """Decide which motions swing for ever.
 
-A run shows where a motion lands, and the return map predicts what follows.
+A run shows where a stage lands, that is, comes to stick; the return map predicts what follows.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from friso.hunting.return_map.settings import ReturnMapSettings
 def motions_go_on(
     flat: Mapping[str, Any], count: int, landing_map: LandingMap, starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which motions of one stage swing for ever, and which are known, both (count,).
+    """Return which motions of one stage swing for ever, and which are certain, both (count,).
 
-    The stage is given as flat keys to SI numbers or arrays (count,). Motions are given by these keys, or by initial
-    states at rest at the reference, `starts` (count, states). The result is unknown if the reference does not come back
-    to its start.
+    `flat` has the stage's keys in SI, and arrays (count,) where motions differ. Motions may also begin at the reference
+    from initial states, `starts` (count, states). The result is uncertain if the reference does not come back to its
+    start.
     """
     if starts is not None:
         return _go_on(Ensemble.held(flat, count), starts, landing_map)
@@ -44,9 +44,9 @@ def motions_go_on(
 
 @np.errstate(all="ignore")  # a stage that never lands is still at its reference
 def _go_on(stages: Ensemble, starts: np.ndarray, landing_map: LandingMap) -> tuple[np.ndarray, np.ndarray]:
-    """Return which runs swing for ever, and for which this is known, both (runs,).
+    """Return which runs swing for ever, and for which that is certain, both (runs,).
 
-    The places where the runs land decide.
+    Runs begin from the states `starts`; where they land decides.
     """
     settings = ReturnMapSettings.current()
     count = len(starts)

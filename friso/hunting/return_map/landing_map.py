@@ -1,4 +1,7 @@
-"""Interpolate a stage's return map from landing to landing, and iterate it to attractors."""
+"""Interpolate a stage's return map, and iterate it to attractors.
+
+The map takes one landing, the distance at which the stage sticks, to the next.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,10 @@ from friso.hunting.return_map.landings import Landings
 from friso.hunting.return_map.settings import ReturnMapSettings
 
 OTHER_SIDE = 1e3
-"""Shift of the map coordinate for landings on the negative side."""
+"""Shift of a landing's coordinate on the map, its log distance, on the negative side."""
 
 REST = -1e6
-"""Map coordinate that stands for a stage that rests, or has diverged."""
+"""Coordinate on the map that stands for a stage that rests, or has diverged."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,9 @@ class MapAttractor:
 
 @dataclass(frozen=True)
 class LandingMap:
-    """Return map of one stage, points in ascending order of distance.
+    """Return map of one stage: landings and the next ones, in ascending order of distance.
+
+    A landing is where the stage sticks after a swing.
 
     - `before` (points,): signed distances of landings; without sign where the stage is `symmetric`.
     - `after` (points,): distances of the next landings, 0 where the stage rests, infinite where it diverges.
@@ -57,7 +62,7 @@ class LandingMap:
 
     @classmethod
     def of(cls, landings: Landings, length: float, symmetric: bool) -> LandingMap:
-        """Make the map from the landings of runs of one stage.
+        """Make the map from the landings of runs of one stage: where it sticks after each swing.
 
         The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
         deflection of the loop by the break-away force.
@@ -80,16 +85,16 @@ class LandingMap:
         return cls(before[order], after[order], run[order], final[order], symmetric, lost)
 
     def renumbered(self, runs: np.ndarray) -> LandingMap:
-        """Return the map with its runs renumbered as in `runs`, shape (runs,)."""
+        """Return the map with new numbers for its runs: `runs`, shape (runs,), has them."""
         return replace(self, run=runs[self.run])
 
     @property
     def sides(self) -> tuple[float, ...]:
-        """Return the signs of the sides that the map treats separately."""
+        """Return the sides of the reference that the map treats separately: 1 alone, or 1 and -1."""
         return (1.0,) if self.symmetric else (1.0, -1.0)
 
     def points(self, side: float) -> np.ndarray:
-        """Return the numbers of the points on a side, by ascending distance."""
+        """Return the numbers of the points on a side, 1 or -1, by ascending distance."""
         return np.flatnonzero(self.before * side > 0)[:: int(side)]
 
     @property
@@ -99,9 +104,9 @@ class LandingMap:
 
     @cached_property
     def _lines(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the straight pieces of the map over places: begin, value at place 0, and slope.
+        """Return the straight pieces of the map: where each begins, its value at 0, and its slope.
 
-        Places (see `_place`) ascend. Between two points the logarithm of distance is linear. Where the map breaks off,
+        Coordinates are logarithms of distance (see `_place`), and ascend. Where the map breaks off between two points,
         each half has the gain of the nearer point.
         """
         settings = ReturnMapSettings.current()
@@ -143,7 +148,10 @@ class LandingMap:
         return np.array(begins), np.array(values), np.array(slopes)
 
     def next(self, places: np.ndarray) -> np.ndarray:
-        """Return the places of the next landings (see `_place`), (count,), by interpolation."""
+        """Return the coordinates of the landings that follow landings at `places`, both (count,).
+
+        Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
+        """
         settings = SurveySettings.current()
         begins, values, slopes = self._lines
         pieces = np.searchsorted(begins, places, side="right") - 1
@@ -153,13 +161,16 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """Return the map's attractors in which a stage swings for ever, from all points."""
+        """Return the map's attractors, in which a stage swings for ever; any point may lead there."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))
 
     def _followed(self, at: np.ndarray) -> np.ndarray:
-        """Iterate the map until it is on an attractor; return the last landings, (points, landings)."""
+        """Iterate the map from coordinates until they are on attractors; return their last landings.
+
+        The result holds coordinates (see `_place`), shape (points, landings).
+        """
         settings = ReturnMapSettings.current()
         survey_settings = SurveySettings.current()
         iterations, before, paths = settings.map_iterations, np.full(len(at), np.inf), at[:, None]
@@ -195,7 +206,7 @@ class LandingMap:
         return np.all(self._followed(self._places(distances)) > REST, axis=1)
 
     def _places(self, distances: np.ndarray) -> np.ndarray:
-        """Return the places of landings at signed distances."""
+        """Return the coordinates on the map (see `_place`) of landings at signed distances."""
         at = np.abs(distances) if self.symmetric else distances
         moves = np.isfinite(at) & (np.abs(at) >= SurveySettings.current().least_swing)
         return np.where(moves, _place(np.where(moves, at, 1.0)), REST)
@@ -203,7 +214,7 @@ class LandingMap:
     def _told_apart(self, paths: np.ndarray) -> Iterator[MapAttractor]:
         """Yield each attractor once, from paths that end on attractors.
 
-        Paths hold places, shape (points, landings).
+        Paths are coordinates on the map (see `_place`), shape (points, landings).
         """
         settings = ReturnMapSettings.current()
         left = np.all(paths > REST, axis=1)
@@ -218,9 +229,9 @@ class LandingMap:
             left &= ~same
 
     def slope(self, attractor: MapAttractor) -> float:
-        """Return the growth of a small deviation from an attractor per repetition, without sign.
+        """Return by what factor a small deviation from an attractor grows per repetition.
 
-        It is read off the map, and infinite if the attractor does not repeat.
+        It is read off the map, without sign, and infinite if the attractor does not repeat.
         """
         if not attractor.periodic:
             return np.inf
@@ -229,10 +240,11 @@ class LandingMap:
 
     @property
     def scatter(self) -> tuple[float, float]:
-        """Return the largest relative error of a landing predicted by neighbours, and its distance.
+        """Return the largest relative error of a landing predicted by neighbours, and where it is.
 
-        The error is infinite if a stage rests between two landings that continue alike, or the reverse. It is 0 if no
-        three points are close together. Only points whose next landing is at more than half of their distance count.
+        The place is a signed distance. The error is infinite if a stage rests between two landings that continue alike,
+        or the reverse. It is 0 if no three points are close together. Only points whose next landing is at more than
+        half of their distance count.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
@@ -257,12 +269,12 @@ class LandingMap:
 
 
 def _place(distances: np.ndarray) -> np.ndarray:
-    """Return the logarithms of signed distances, shifted on the negative side."""
+    """Return coordinates on the map: logarithms of distances, shifted on the negative side."""
     return np.log(np.abs(distances)) + OTHER_SIDE * (distances < 0)
 
 
 def _distance(places: np.ndarray) -> np.ndarray:
-    """Return the signed distances at places."""
+    """Return signed distances from coordinates on the map (see `_place`)."""
     negative = places > OTHER_SIDE / 2
     return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - OTHER_SIDE, places))
 
@@ -270,9 +282,9 @@ def _distance(places: np.ndarray) -> np.ndarray:
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Leave out landings beyond `farthest_sticking` from which a run comes back.
 
-    Returns the remaining distances, and how many there are in each run, without the start. From so far a stage passes
-    its reference without sticking, so distance alone does not decide what follows. `distances` have the shape (runs,
-    landings), the start first.
+    From so far a stage passes its reference without sticking, so distance alone does not decide what follows.
+    `distances` have the shape (runs, landings), the start first. Returns the remaining distances, and how many there
+    are in each run, without the start.
     """
     rows, order = np.arange(len(distances))[:, None], np.arange(distances.shape[1])
     near = (np.abs(distances) <= ReturnMapSettings.current().farthest_sticking) & (order <= count[:, None])
@@ -284,9 +296,9 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return how closely paths repeat, (points,): least difference to one cycle earlier.
+    """Return by how much paths fail to repeat: the least difference from any cycle earlier.
 
-    Paths have the shape (points, landings).
+    Paths are coordinates on the map, shape (points, landings); the result has the shape (points,).
     """
     settings = SurveySettings.current()
     return np.min(
@@ -295,7 +307,10 @@ def _strays(paths: np.ndarray) -> np.ndarray:
 
 
 def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
-    """Return the number of swings after which the places of landings repeat, 0 if they do not."""
+    """Return after how many swings the landings on a path repeat, 0 if they do not.
+
+    `path`, shape (landings,), has coordinates on the map. Landings of a `symmetric` stage may repeat on the other side.
+    """
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()
     for swings in range(1 if symmetric else 2, survey_settings.most_repeating_swings + 1, 1 if symmetric else 2):
@@ -305,7 +320,10 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 
 
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Return which paths spread over the same range as the first one, shape (points,)."""
+    """Return which paths are on the irregular attractor of the path `first`, shape (points,).
+
+    They are if they spread over the same range.
+    """
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (
         paths.max(axis=1) < first.max() + 10 * settings.same_attractor_share

@@ -19,7 +19,7 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
 RTOL = ToleranceSettings().landing_rtol
-"""Relative tolerance of the runs that find landings."""
+"""Relative tolerance of the runs that find where stages stick."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Landings(ArrayRows):
         return Landings(*(np.concatenate([*pair]) for pair in pairs))
 
     def _with(self, room: int) -> Landings:
-        """Return the runs with room for `room` landings."""
+        """Return the runs with columns for `room` landings, the start included; new ones hold NaN."""
         wider = ((0, 0), (0, room - self.distances.shape[1]))
         distances, times = (np.pad(part, wider, constant_values=np.nan) for part in (self.distances, self.times))
         return replace(self, distances=distances, times=times)
@@ -56,8 +56,8 @@ class Landings(ArrayRows):
 def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float = RTOL) -> Landings:
     """Follow stages from states, (runs, states), until each has landed `most` times or rests.
 
-    Runs have the relative tolerance `rtol`. A round lasts as long as a sticking stage may take to wind up and to cross
-    its reference.
+    A stage lands where it sticks after a swing. Runs have the relative tolerance `rtol`. They go on in rounds, each as
+    long as a sticking stage may take to wind up and to cross its reference.
     """
     orbit_settings = OrbitSettings.current()
     settings = ReturnMapSettings.current()
@@ -106,10 +106,11 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
 
 
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the landings of runs: the farthest places [m] on alternating sides.
+    """Find the landings of runs: the farthest turning points [m] on alternating sides.
 
-    Returns the places, their times [s], and their number. Places and times have the shape (runs, landings), the start
-    first; the number excludes the start, (runs,). `values` and `times` have the shape (runs, places), NaN for no place.
+    Returns where they are, their times [s], and their number. Positions and times have the shape (runs, landings), the
+    start first; the number excludes the start, (runs,). `values` and `times` have the shape (runs, points), NaN for
+    none.
     """
     count = len(values)
     rows = np.arange(count)

@@ -38,8 +38,8 @@ class Mapped:
     """Stages with the runs that sample their return maps.
 
     Each run belongs to the stage with the number `owners` (runs,). It began stuck at `starts` (runs,), signed, in
-    deflections of the loop by the break-away force; NaN marks a run that goes on from the run numbered `continued`
-    (runs,). `landings` are the landings of all runs, to the relative tolerance `rtol`.
+    deflections of the loop by the break-away force; NaN marks a run that goes on from another one. `continued` (runs,)
+    marks runs from which others go on. `landings` are the landings of all runs, to the relative tolerance `rtol`.
     """
 
     stages: Ensemble
@@ -62,7 +62,7 @@ class Mapped:
 
     @property
     def attracts(self) -> np.ndarray:
-        """Return which stages have a map on which landings continue for ever, shape (count,)."""
+        """Return which stages have a map on which swings continue for ever, shape (count,)."""
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
@@ -73,7 +73,7 @@ class Mapped:
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
     def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
-        """Add runs of the stages `owners` that have landed already."""
+        """Add runs that have landed already; `owners`, shape (runs,), number their stages."""
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
@@ -90,7 +90,10 @@ class Mapped:
         return joined
 
     def begun(self, owners: np.ndarray, starts: np.ndarray, most: int | None = None) -> Mapped:
-        """Add runs of the stages `owners` that stick at first at `starts`, both of shape (runs,)."""
+        """Add runs that stick at first at `starts`; `owners` number their stages, both (runs,).
+
+        Each lands at most `most` times.
+        """
         most = ReturnMapSettings.current().run_landings if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
 
@@ -114,7 +117,7 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Return starts of more runs, whose landings should fill gaps between points."""
+        """Choose starts for more runs of a stage, so that points fill gaps in its map."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -138,7 +141,7 @@ def map_stages(
 ) -> Mapped:
     """Sample the return maps of stages by runs stuck `near` their reference, and farther off.
 
-    A `sparse` map has every third of the farther starts only.
+    Runs are added in `rounds` where a map is too coarse. A `sparse` map has every third of the farther starts only.
     """
     settings = ReturnMapSettings.current()
     limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
@@ -179,7 +182,10 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """Return the landings of runs of the stages `owners` that stick at `starts`, both (runs,)."""
+    """Return the landings of runs that stick at first at `starts`, at most `most` of each run.
+
+    `owners` are the numbers of their stages. Both have the shape (runs,).
+    """
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
 
@@ -217,9 +223,9 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """Return the runs of the outermost points that land about as far off next.
+    """Return runs from the nearest and farthest point of a map that must be extended beyond it.
 
-    At these points the map must be extended.
+    It must be if the next landing from such a point is not much nearer to the reference.
     """
     settings = ReturnMapSettings.current()
     runs = []
@@ -232,9 +238,10 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Return starts half-way between some runs and their neighbours.
+    """Return starts between those of some runs and their neighbours, half-way in the logarithm.
 
-    `starts` ascend; `numbers` are the run numbers of the starts, and `runs` the numbers of the runs.
+    `starts` ascend; `numbers` are their runs, and `runs` the numbers of the runs in question. Neighbours lie on the
+    same side of the reference.
     """
     between = []
     for run in runs:
@@ -246,9 +253,9 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts at breaks of the map, where neighbours land differently or not at all.
+    """Return starts to add where neighbouring runs land differently, or one of them not at all.
 
-    An attractor may reach up to such a break. Starts ascend. `landings`, (runs,), are the first landings.
+    An attractor may reach up to such a break of the map. `starts` ascend; `landings`, (runs,), are the first landings.
     """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing
@@ -264,10 +271,10 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 
 
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
-    """Return a start whose run should land at a place, or None.
+    """Return a start whose run should land at the distance `place`, or None.
 
-    It lies between two neighbouring starts whose runs land on either side of the place. `starts` (runs,) ascend; `seen`
-    (runs, landings) are landings with the start first.
+    It lies between two neighbouring starts whose runs land nearer and farther. `starts` (runs,) ascend; `seen` (runs,
+    landings) are landings with the start first.
     """
     best, start = np.inf, None
     for k in range(1, ReturnMapSettings.current().run_landings):

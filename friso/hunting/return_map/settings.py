@@ -9,7 +9,10 @@ from friso.settings import Settings, setting
 
 @dataclass(frozen=True)
 class ReturnMapSettings(Settings):
-    """Settings of return maps, which predict the next sticking distance from the present one."""
+    """Settings of return maps, which predict the next sticking distance from the present one.
+
+    A landing is where a stage sticks after a swing.
+    """
 
     hardly_attracting_share: float = setting(0.95, "")
     """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. Above it, 51 of 149

@@ -17,7 +17,10 @@ ADRC = "adrc"
 
 
 class Rejection(NamedTuple):
-    """Bandwidth of the feedback [Hz], and bandwidth of the observer as a multiple of it."""
+    """Bandwidths of a disturbance-rejecting controller: of its feedback [Hz], of its observer.
+
+    The observer's is a multiple of the feedback's.
+    """
 
     bandwidth: float
     observer_ratio: float
@@ -26,8 +29,9 @@ class Rejection(NamedTuple):
 def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
     """Return the stage with active disturbance rejection as fast as its present controller.
 
-    The loop of the sliding machine, with its assumed mass, crosses 0 dB at the first of the present `crossings` [Hz].
-    Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too slow.
+    The loop of the sliding machine, with the mass for which it is tuned, crosses 0 dB at the lowest of the present
+    `crossings` [Hz]. Force limit and filters are kept. Raises InputError if there is no crossing, or the drive is too
+    slow.
     """
     if not crossings:
         raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
@@ -47,5 +51,5 @@ def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
 
 
 def rejection(flat: Mapping[str, Any]) -> Rejection | None:
-    """Return the bandwidths of a disturbance-rejecting controller, None for other controllers."""
+    """Return the bandwidths of a stage's disturbance-rejecting controller, None for another one."""
     return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None

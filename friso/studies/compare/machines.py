@@ -1,4 +1,4 @@
-"""Draw machines around a stage file, with equal numbers, rails and noise for every option."""
+"""Draw random machines around a stage file, equal for every option in rails and noise."""
 
 from __future__ import annotations
 
@@ -42,9 +42,11 @@ SPREADS: Mapping[str, float] = MappingProxyType(
         "rail.coulomb_deviation": 30.0,
     }
 )
-"""Half-widths of the 95 % intervals [%] of keys for which the stage file has none. friso chose them: friction as it
-differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as uncertain as
-identification leaves them."""
+"""Half-widths of the 95 % intervals [%] of keys for which the stage file has none.
+
+friso chose them: friction as it differs between bearings of one type and preload, masses as weighed, bristles and
+Stribeck velocity as uncertain as identification leaves them.
+"""
 
 ELEMENTS: Mapping[str, float] = MappingProxyType({"friction.element_stiffness": 50.0, "friction.element_damping": 50.0})
 """Half-widths of the 95 % intervals [%] of arrays for which the stage file has none. All elements of an array vary by
@@ -64,7 +66,10 @@ HELD = (
     *(f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.velocity_sample_time", "drive.position_sample_time"),
     *("drive.delay", "drive.velocity_samples"),
 )
-"""Prefixes of keys that an engineer sets: they are equal on all machines, even if the file calls them uncertain."""
+"""Prefixes of keys that an engineer sets.
+
+These keys are equal on all machines, even if the file calls them uncertain.
+"""
 
 SIGNS = int.from_bytes(b"signs")
 """Second half of Philox's key for the signs of model errors."""
@@ -75,11 +80,11 @@ FROM_LEAVES = ("joint.stiffness", "parasitic.")
 
 @dataclass(frozen=True)
 class Machines:
-    """Machines drawn around a stage whose drive states a sample time.
+    """Random machines drawn around a stage whose drive states a sample time.
 
-    `keys` that differ between machines are SI arrays of shape (count,). Further fields are the seeds of noise, and the
-    sign, 1 or -1, of the error of each machine's model. `drawn` and `spreads` [%] tell from which keys of the file, and
-    from which default spreads, the machines were drawn. `notes` are for the reader.
+    `keys` that differ between machines are SI arrays of shape (count,). `seeds` are those of the noise, and `signs`, 1
+    or -1, those of the error of each machine's model, both (count,). The machines come from a `sample` of the keys
+    `from_file`, which the file calls uncertain, and of keys with default `spreads` [%]. `notes` are for the reader.
     """
 
     stage: Stage
@@ -97,19 +102,22 @@ class Machines:
         return len(self.seeds)
 
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys of all machines under an option, which has a stage and changes.
+        """Return the keys of all machines under an option, with SI numbers or arrays (count,).
 
-        The controller is tuned for the stage, not for the drawn masses.
+        An option has a stage, and changes of keys. The controller is tuned for the stage, not for the drawn masses.
         """
         return stage.flat(self.changes(stage, changes))
 
     def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the keys that differ between machines, and those that an option changes."""
+        """Return the keys that differ between machines or that an option changes, with SI values.
+
+        The controller stays tuned for the stage of the option.
+        """
         return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
-    """Draw machines from the uncertain keys of a stage, and from default spreads of others.
+    """Draw `count` machines from a stage's uncertain keys, and from default spreads of others.
 
     Raises InputError for an invalid number of machines or seed, and for ranges of which hardly any machine is valid.
     """
@@ -151,7 +159,7 @@ def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
 
 
 def _spreads(stage: Stage) -> dict[str, float]:
-    """Return default spreads [%] of keys of the stage that are not 0 and not uncertain."""
+    """Return the default spreads [%] of a stage's keys that are not 0 and not uncertain."""
     flat, uncertain = stage.flat(), stage.uncertain()
     follow = FROM_LEAVES if stage.flexure else ()
     single = {key: spread for key, spread in SPREADS.items() if key not in uncertain and not key.startswith(follow)}
@@ -165,7 +173,10 @@ def _spreads(stage: Stage) -> dict[str, float]:
 
 
 def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the deflections [m] at which drawn bristles begin to slip."""
+    """Return the deflections [m] at which the bristles of drawn machines begin to slip.
+
+    `flat` has the keys of the file's stage, and `keys` the drawn ones, arrays (count,).
+    """
 
     def most(values: Mapping[str, Any]) -> Any:
         weaker = 1 - np.abs(values.get("friction.asymmetry", 0.0))
@@ -177,7 +188,7 @@ def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.nda
 
 
 def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
-    """Return the stage with given spreads [%]."""
+    """Return the stage with the `spreads` [%] written into its keys, as uncertainties."""
     flat = stage.flat()
     if SLIP in spreads:
         flat[SLIP] *= TINY
@@ -188,7 +199,10 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 
 def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
-    """Return the given correlations, and default ones for the keys with default spreads."""
+    """Return the user's correlations, joined by default ones for keys with default `spreads`.
+
+    Static and Coulomb friction are correlated, and the elements of an array vary together.
+    """
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
     groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]

@@ -28,11 +28,11 @@ CLOSER, WITHIN = 2, 9
 
 @dataclass(frozen=True)
 class MachineMeasures:
-    """Measures of runs, arrays of shape (count,).
+    """Measures of the runs of machines, arrays of shape (count,).
 
     - `outcome`: words of `friso.hunting.criteria.run_outcome`, with the tolerance as band; `counted`: distinct peaks.
-    - `settling` [s]: see `friso.hunting.criteria.settling`. It is infinite if the machine swings, creeps, or is not in
-      position at the far end of its motion when it returns.
+    - `settling` [s]: longest time to settle at a place (`friso.hunting.criteria.settling`). It is infinite if the
+      machine swings, creeps, or is not in position at the far end of its motion when it returns.
     - `in_position` [m]: root mean square of the deviation in the last quarter of the run.
     - `force` [N]: root mean square of the commanded force over the whole run.
     """
@@ -70,7 +70,7 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
 def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
-    """Measure a chunk of runs whose reference comes to stand at `stands`.
+    """Measure a chunk of runs of machines, whose reference comes to stand at `stands`.
 
     A machine is in position `within` [m] of its reference. Peaks are counted in the drive's log; all else is measured
     on the true motion.
@@ -94,7 +94,7 @@ def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) ->
 class Later:
     """Runs that were continued, arrays of shape (runs,).
 
-    `done` tells whether they were completed, `stays` whether the stage is in position throughout the last half.
+    `done` is true for runs that were completed, and `stays` for machines in position throughout the last half.
     """
 
     done: np.ndarray
@@ -103,7 +103,7 @@ class Later:
 
 @np.errstate(all="ignore")
 def staying_in_position(recorded: RecordedRuns, within: float) -> Later:
-    """Return whether runs of a chunk stay within `within` [m] of their reference."""
+    """Return which longer runs were completed, and which stay `within` [m] of the reference."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE
     words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)
@@ -118,8 +118,8 @@ def _rms(values: np.ndarray) -> np.ndarray:
 class LoopRobustness:
     """Stability and margin of the linear loop of each machine, arrays of shape (count,).
 
-    `stable` tells whether the loop is stable in all limit cases, `margin` is the least modulus margin among the cases
-    (0 if it is not stable).
+    `stable` is true if the loop is stable in all limit cases of the joint and the friction. `margin` is the least
+    modulus margin among the cases, 0 if it is not stable.
     """
 
     stable: np.ndarray
@@ -127,9 +127,9 @@ class LoopRobustness:
 
 
 def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
-    """Return stability and margin of the machines' linear loops, in the limit cases of a stage.
+    """Return stability and margin of machines' linear loops, in the limit cases of a stage.
 
-    `flat` holds the machines as flat keys to SI numbers or arrays (count,).
+    `flat` has the machines' keys, such as "masses.cart", with SI numbers or arrays (count,).
     """
     stable, margin = np.ones(count, bool), np.full(count, np.inf)
     for limit_case in limit_cases(stage.flat()).values():
@@ -140,7 +140,7 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
 
 
 def _robustness(loops: Poles) -> tuple[np.ndarray, np.ndarray]:
-    """Return which loops are stable, and the least distance of each from -1, both (members,)."""
+    """Return which loops are stable, and the least distance of each from -1, both (loops,)."""
     size, rows = np.abs(loops.continuous), np.arange(len(loops.closed))
     low = SLOWEST * float(np.median(size.min(axis=1)))
     high = min(loops.drive.highest, FASTEST * float(size.max()))

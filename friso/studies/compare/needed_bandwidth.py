@@ -24,10 +24,10 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Fractions of machines that come to rest by the controller alone, for each bandwidth, (n,).
+    """Fractions of machines that come to rest by the controller alone, for n bandwidths.
 
-    The bandwidths [Hz] are the last 0 dB crossings of the open loop, from the present one to the highest with enough
-    margin. The joint is locked, and the controller in continuous time.
+    `bandwidths` [Hz] are the last 0 dB crossings of the open loop, from the present one to the highest with enough
+    margin. `shares` are the fractions. The joint is locked, and the controller in continuous time.
     """
 
     bandwidths: np.ndarray
@@ -36,7 +36,7 @@ class NeededBandwidth:
     def turning(self, enough: float) -> int | None:
         """Return the index of the bandwidth from which enough machines come to rest, or None.
 
-        `enough` is their fraction.
+        `enough` is the fraction of machines that counts as enough.
         """
         missed = np.flatnonzero(self.shares < enough)
         first = int(missed[-1]) + 1 if missed.size else 0
@@ -45,9 +45,10 @@ class NeededBandwidth:
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
 def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> NeededBandwidth | None:
-    """Run moves of some machines, joint `locked`, with controllers of many bandwidths.
+    """Run moves of some machines at many bandwidths, and count those that come to rest.
 
-    Returns None if no higher bandwidth keeps the margin.
+    The joint is `locked` in the stage, and rest means `within` [m] of the reference. Returns None if no higher
+    bandwidth keeps the margin.
     """
     settings = StudySettings.current()
     tried, count = settings.needed_bandwidths, min(machines.count, settings.needed_machines)

@@ -36,14 +36,14 @@ PER_PERIOD = 10
 
 
 class UnavailableError(Exception):
-    """Error: the machines cannot have an option, with the reason."""
+    """Error: the machines cannot have an option; its text says why."""
 
 
 @dataclass(frozen=True)
 class Situation:
-    """The machines to be settled, and the tolerance `within` [m] for in position.
+    """The machines to be brought to rest, and the tolerance `within` [m] for in position.
 
-    The bandwidth of a faster controller must not exceed `bandwidth_limit` [Hz]; None means that only margins limit it.
+    A faster controller must not exceed the `bandwidth_limit` [Hz]; with None only margins limit it.
     """
 
     machines: Machines
@@ -52,12 +52,12 @@ class Situation:
 
     @property
     def locked(self) -> Stage:
-        """Return the stage with its joint locked, or unchanged without a joint."""
+        """Return the stage with its joint locked; without a joint, unchanged."""
         return self.machines.stage.variants().get("locked", self.machines.stage)
 
     @property
     def free(self) -> Stage:
-        """Return the stage on its free joint. Raises UnavailableError where it has none."""
+        """Return the stage on its free joint. Raises UnavailableError if the stage has no joint."""
         free = self.machines.stage.variants().get("free")
         if free is None:
             raise UnavailableError("the stage file has no joint with stiffness, damping and stroke")
@@ -67,7 +67,7 @@ class Situation:
     def integrating(self) -> Stage:
         """Return the stage with its joint locked, if its controller integrates.
 
-        Raises UnavailableError otherwise.
+        Raises UnavailableError if the controller does not.
         """
         flat = self.machines.stage.flat()
         if not controller_of(flat).integrates(flat):
@@ -76,15 +76,15 @@ class Situation:
 
     @property
     def deadband(self) -> float:
-        """Return the deadband of the integrator [m]."""
+        """Return the deadband of the integrator [m], a fixed fraction of the tolerance."""
         return DEADBAND * self.within
 
 
 class Variant(NamedTuple):
-    """A stage with one option.
+    """A stage as an option changes it.
 
-    `changes` are keys that differ between machines: numbers, or arrays with one value for each machine. `factor` is the
-    factor by which the controller is faster.
+    `changes` are keys that differ between machines: SI numbers, or arrays with one value for each machine. The
+    controller is faster by `factor`.
     """
 
     stage: Stage
@@ -99,13 +99,13 @@ class OptionKind:
     Parameters
     ----------
     name : str
-        Name in code; for settings against friction also the word after `--also`.
+        Name in code; for options that run only on request, also the word after `--also`.
     letter, title : str
         Names in tables, figures and JSON.
     says : str
-        Description, with the numbers of words.py in braces.
+        Description, with braces where words.py fills in numbers.
     variant : callable
-        Returns the machine with this option. Raises UnavailableError for machines that cannot have it.
+        Returns the stage with this option, from a `Situation`. Raises UnavailableError if machines cannot have it.
     line : tuple of str
         Colour and dash of its curves.
     prose : str
@@ -130,7 +130,10 @@ class OptionKind:
 
 @dataclass(frozen=True)
 class Option:
-    """An option on the machines: its kind, with stage, changes and factor as in `Variant`."""
+    """An option as machines have it: its kind, its stage, and its changes of keys.
+
+    `changes` are SI numbers, or arrays with one value for each machine. The controller is faster by `factor`.
+    """
 
     kind: OptionKind
     stage: Stage
@@ -144,15 +147,15 @@ class Option:
 
     @property
     def label(self) -> str:
-        """Return the name of the option in a table: "c isolator"."""
+        """Return the name of the option in a table, such as "c isolator"."""
         return f"{self.kind.letter} {self.kind.title}"
 
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Options that the machines can have.
+    """Options that the machines can have, and the deadband of the integrator [m].
 
-    `left_out` gives by letter why an option was left out; the deadband of the integrator is in [m].
+    `left_out` says for each letter of an option left out why the machines cannot have it.
     """
 
     options: tuple[Option, ...]
@@ -161,10 +164,10 @@ class CompareOptions:
 
 
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys for the linear loop of machines.
+    """Return the keys from which the linear loops of machines are computed, with SI values.
 
-    All machines have the stage's current loop. The ratio of true to assumed motor constant is part of the controller's
-    gains. The cable is left out.
+    `flat` has the machines' keys. All machines have the stage's current loop. The ratio of true to assumed motor
+    constant becomes a factor of the controller's gains. The cable is left out.
     """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
@@ -198,8 +201,8 @@ def options(
 def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the file's machine keeps its margin.
 
-    The bandwidth is below its limit. An engineer tunes one machine, and all others get its settings. Raises
-    UnavailableError if the present bandwidth is already that high.
+    The bandwidth stays below the limit of the `situation`. An engineer tunes one machine, and all others get its
+    settings. Raises UnavailableError if the present bandwidth is already that high.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -223,7 +226,7 @@ def _faster(stage: Stage, situation: Situation) -> Variant:
 def _feedforward(situation: Situation) -> Variant:
     """Return the locked stage with feedforward of each machine's Coulomb and viscous friction.
 
-    The feedforward of both is off by the model error. Raises UnavailableError if there is no such friction.
+    The fed-forward friction is wrong by the model error. Raises UnavailableError if there is no such friction.
     """
     machines = situation.machines
     flat = anywhere(machines.flat(machines.stage, {}))
@@ -239,13 +242,19 @@ def _feedforward(situation: Situation) -> Variant:
 
 
 def _with_setting(setting: Setting, situation: Situation) -> Variant:
-    """Return the locked stage with a setting against friction, at one size."""
+    """Return the locked stage with a setting against friction, sized for the tolerance.
+
+    Raises UnavailableError if the setting needs a controller that integrates.
+    """
     stage = situation.integrating if setting.integral else situation.locked
     return Variant(stage.with_numbers(setting.numbers(stage.flat(), situation.within)))
 
 
 def _rejecting(situation: Situation) -> Variant:
-    """Return the locked stage with disturbance rejection, as fast as the present controller."""
+    """Return the locked stage with disturbance rejection, as fast as the present controller.
+
+    Raises UnavailableError if that cannot be.
+    """
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers
     try:

@@ -20,7 +20,10 @@ class EstimatedValue:
 
 
 def median(values: np.ndarray) -> EstimatedValue:
-    """Return the median; infinite values are allowed, NaN are left out."""
+    """Return the median of values (n,) and its 95 % interval, from those that are not NaN.
+
+    Infinite values are allowed.
+    """
     ranked = np.sort(values[~np.isnan(values)])
     if not ranked.size:
         return EstimatedValue(np.nan, np.nan, np.nan)
@@ -45,9 +48,10 @@ def _middle(ordered: np.ndarray) -> float:
 
 
 def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
-    """Return the increase in the probability of an event on paired machines.
+    """Return how much more probable an event is with a change than `before`, on paired machines.
 
-    Agresti, Min 2005, doi:10.1002/sim.1781: Wald's interval, with half a machine added to every cell.
+    `flags` and `before`, (count,), are true for machines with the event. The interval is Wald's, with half a machine
+    added to every cell (Agresti, Min 2005, doi:10.1002/sim.1781).
     """
     count = len(flags)
     if not count:

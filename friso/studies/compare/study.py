@@ -54,8 +54,8 @@ afterwards."""
 class OptionResult:
     """An option with the measures of each machine's run, and with the linear loop of each.
 
-    `later` holds longer runs of the first machines; there are none if too few machines are in position at the end of
-    the shorter ones.
+    `later` has longer runs of the first machines. It is empty if too few machines are in position at the end of the
+    shorter runs.
     """
 
     option: Option
@@ -70,17 +70,17 @@ class OptionResult:
 
     @property
     def swinging(self) -> Share:
-        """Return the probability of swinging at the end of the run."""
+        """Return the probability that a machine swings at the end of the run."""
         return share(self.measures.swings, self.measures.done)
 
     @property
     def counted(self) -> Share:
-        """Return the probability of a distinct peak (see `friso.hunting.criteria.peak_count`)."""
+        """Return the probability of distinct peaks (see `friso.hunting.criteria.peak_count`)."""
         return share(self.measures.counted > 0, self.measures.done)
 
     @property
     def settled(self) -> Share:
-        """Return the probability that a machine is in position, and stays there, at the end."""
+        """Return the probability that a machine is in position at the end of the run, at rest."""
         return share(self.measures.rests, self.measures.done)
 
     @property
@@ -122,19 +122,22 @@ class OptionResult:
 
     @property
     def rests(self) -> bool:
-        """Tell whether `ENOUGH` machines are in position by the end and, if followed, stay there."""
+        """Tell whether the option brings `ENOUGH` machines into position, and they stay there.
+
+        Machines that were run for longer show whether they stay; without such runs the result is false.
+        """
         in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
         return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)
 
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a, on paired machines.
+    """An option compared with option a, on the same machines.
 
-    `swinging` is the increase in the probability of swinging at the end. `sooner`, `later` and `alike` are the
-    fractions of machines that are in position sooner or later than with option a, or at the same time (or never with
-    both). `in_position` and `force` are the medians of the factors on the root mean square deviation in position, and
-    on the root mean square force.
+    `swinging` is the increase in the probability of swinging at the end. `sooner` and `later` are the fractions of
+    machines that are in position sooner or later than with option a. `alike` is the fraction that is so at the same
+    time, or never with both. `in_position` and `force` are medians over the machines, of the option's value divided by
+    that with option a. The values are the root mean square deviation in position, and the root mean square force.
     """
 
     swinging: EstimatedValue
@@ -147,10 +150,10 @@ class Paired:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Results of all options on machines drawn with a seed, with tolerance [m] and notes.
+    """Results of all options on machines drawn with a seed.
 
-    `needed` gives the bandwidth that the controller alone needs. No faster controller exceeds `bandwidth_limit` [Hz].
-    The options in `not_run` were skipped by an interruption.
+    A machine is in position `within` a tolerance [m]. `needed` gives the bandwidth that the controller alone needs. No
+    faster controller exceeds `bandwidth_limit` [Hz]. An interruption skipped the options in `not_run`.
     """
 
     machines: Machines
@@ -171,7 +174,7 @@ class Comparison:
     def shaken(self) -> bool:
         """Tell whether a floor shakes the machines.
 
-        Without a shaking floor, standstill shows whether machines rest, not how still they stand.
+        Without a shaking floor, the deviation at rest shows whether machines rest, not how still they stand.
         """
         return self.stage.floor is not None
 
@@ -204,12 +207,12 @@ def compare(
     begins: Callable[[], None] = lambda: None,
     bandwidth_limit: float | None = None,
 ) -> Comparison:
-    """Run `count` machines drawn around a stage under up to seven options.
+    """Run `count` machines drawn around a stage under up to seven options, or more with `also`.
 
-    In position means `within` [m]. `also` adds settings against friction (`friso.equations.settings`), or "adrc". No
-    faster controller exceeds the `bandwidth_limit` [Hz]. `begins` is called before the first long work, once the input
-    has been checked. Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that
-    ends too late.
+    A machine is in position `within` a tolerance [m] of its reference. `also` adds settings against friction
+    (`friso.equations.settings`), or "adrc". No faster controller exceeds the `bandwidth_limit` [Hz]. `begins` is called
+    before the first long work, once the input has been checked. Raises InputError for a number, a seed or a tolerance
+    that is not allowed, and for a motion that ends too late.
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
@@ -240,9 +243,9 @@ def compare(
 
 
 def _places(stage: Stage) -> list[Stand]:
-    """Return the places at which the reference comes to stand.
+    """Return where and when the reference comes to stand.
 
-    Raises InputError if that is too late, or never.
+    Raises InputError if it does so too late in the run, or never.
     """
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
@@ -257,9 +260,9 @@ def _places(stage: Stage) -> list[Stand]:
 
 @dataclass(frozen=True)
 class _Work:
-    """Inputs that all options share.
+    """Inputs of the runs that all options share.
 
-    They are machines, task, places of the reference, tolerance [m], progress, and number of options.
+    They are machines, task, stands of the reference, tolerance `within` [m], progress, and number of options.
     """
 
     machines: Machines
@@ -270,7 +273,7 @@ class _Work:
     options: int
 
     def runs(self, option: Option, before: int) -> MachineMeasures:
-        """Run an option on all machines, after `before` other options."""
+        """Run an option on all machines and measure them, after `before` other options."""
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)
@@ -280,7 +283,7 @@ class _Work:
         return concatenate_chunks(parts)
 
     def longer(self, option: Option) -> Later:
-        """Run an option on the first machines, for longer."""
+        """Run an option on the first machines for longer, and return which stay in position."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
         return concatenate_chunks(
@@ -288,7 +291,10 @@ class _Work:
         )
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[RecordedRuns]:
-        """Yield the runs of the first machines, chunk by chunk."""
+        """Yield the recorded runs of the first `count` machines, chunk by chunk.
+
+        The samples are `coarser` times as far apart as usual.
+        """
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
         drawn = self.machines.changes(option.stage, option.changes)
@@ -315,7 +321,7 @@ def _missing(stage: Stage) -> list[str]:
 
 
 def _troubles(results: list[OptionResult], count: int) -> list[str]:
-    """Return unstable loops and failed runs by option, in words."""
+    """Return notes on unstable loops and failed runs, one for each option that has some."""
     failed = "the intervals of probabilities allow for either outcome of these, medians leave them out"
     notes = []
     for result in results:

@@ -1,1 +1,1 @@
-"""Convert friction laws, and judge a stage under each law that fits the measurements."""
+"""Convert friction laws, and judge a stage under each law that fits its measurements."""

@@ -1,7 +1,7 @@
-"""Fit the nearest concave, rising curve from 0 to points.
+"""Fit a concave, rising curve from 0 to measured points, by least squares.
 
-Parallel springs that slip one after the other make such a curve. The fit is by least squares. Knots near rest that the
-points do not support only follow noise, and are left out.
+Parallel springs that slip one after the other make such a curve. Knots near rest that the points do not support only
+follow noise, and are left out.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class ConcaveFit:
-    """A concave curve from 0 to its end over increasing `knots`, shape (n,).
+    """A concave curve that rises from 0, with n increasing `knots`, where parts of it end.
 
-    The curve is a sum of parts, one for each knot and kind. Parts of the first kind are straight up to their knot;
-    parts of the second are bent so that their slope falls to 0 there. `strength`, shape (2, n), is the end value of
-    each part. Further fields are the standard error of the initial slope, -2 times the logarithm of the likelihood, and
-    the number of free parameters.
+    The curve is a sum of parts, one for each knot and kind. A part of the first kind is straight up to its knot; one of
+    the second kind is bent, so that its slope falls to 0 there. `strength`, shape (2, n), is the end value of each
+    part. `error` is the standard error of the initial slope. `misfit` is -2 times the logarithm of the likelihood, and
+    `free` the number of free parameters.
     """
 
     knots: np.ndarray
@@ -33,21 +33,21 @@ class ConcaveFit:
 
     @property
     def corners(self) -> np.ndarray:
-        """Return the knots at which some part of the curve ends, shape (at most n,)."""
+        """Return the knots at which some part of the curve ends, at most n."""
         return self.knots[self.strength.any(axis=0)]
 
     @property
     def akaike(self) -> float:
-        """Return Akaike's criterion; a smaller one is more likely."""
+        """Return Akaike's criterion: the smaller it is, the more likely the curve."""
         return self.misfit + 2 * self.free
 
     @property
     def slope(self) -> float:
-        """Return the slope at the start."""
+        """Return the slope at the start of the curve."""
         return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """Return the curve at x, of its shape (m,), constant beyond the last knot."""
+        """Return the curve's values at x, shape (m,); it is constant beyond the last knot."""
         return _shapes(x, self.knots) @ self.strength.ravel()
 
 
@@ -56,9 +56,9 @@ _SLOPES = np.array([1.0, 2.0])
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return both kinds of parts with end value 1 at x, shape (m, 2 n).
+    """Return the values at x, (m,), of parts of both kinds with end value 1; shape (m, 2 n).
 
-    Below 0, where noise may lead, they continue straight.
+    Below 0, where noise may lead, the parts continue straight.
     """
     reached = np.minimum(x[:, None] / knots, 1.0)
     return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])
@@ -84,9 +84,9 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 
 
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
-    """Yield the nearest curves to points x and y, both of shape (m,), that reach `end`.
+    """Yield concave curves through points x and y, both (m,), that reach the value `end`.
 
-    Fits are made with straight parts and, for many points, with bent parts too, and with the first few knots left out.
+    Fits use straight parts and, for many points, bent parts too, with the first few knots left out one after the other.
     Beyond the points a curve continues with its final slope, at most as far again.
     """
     settings = StudySettings.current()
@@ -110,15 +110,18 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
 
 
 def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return the equations of a fit in an equivalent form with as few rows as unknowns.
+    """Return the equations of the least-squares fit, reduced to as few rows as unknowns.
 
-    Their shape is (2 n + 1, 2 n + 1) at most, with the right-hand side last.
+    Their shape is (2 n + 1, 2 n + 1) at most for n knots, with the right-hand side last.
     """
     return np.asarray(np.linalg.qr(np.column_stack([_shapes(x, knots), y]), mode="r"))
 
 
 def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: int, end: float) -> ConcaveFit:
-    """Fit one curve from the equations `rows` of all."""
+    """Fit one curve, without the knots before index `first`, from the equations of all knots.
+
+    Without `bent` it has straight parts only. `points` is the number of points, and `end` the value reached.
+    """
     settings = StudySettings.current()
     used = np.arange(2 * len(knots)).reshape(2, -1)[: 1 + bent, first:].ravel()
     weights, away = nnls(rows[:, used], rows[:, -1], maxiter=settings.fit_steps)

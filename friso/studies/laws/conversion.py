@@ -1,4 +1,4 @@
-"""Convert a friction law to another that fits the same measurements; report the losses."""
+"""Convert a friction law to another that fits the same measurements, and report the losses."""
 
 from __future__ import annotations
 
@@ -34,17 +34,20 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 MeasuredKind = Literal[
     "curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions", "loop area", "loop stiffness"
 ]
-"""Measured quantities: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping at
-rest, viscous damping; the conditions under which they were taken; and the energy lost in a hysteresis loop before
-sliding, and its stiffness from end to end."""
+"""Measured quantities of friction.
+
+They are steady friction over speed, break-away, stiffness before sliding, the virgin curve (force over displacement
+from rest), damping at rest, and viscous damping. Then come the conditions under which they were taken. Last are the
+energy lost in a hysteresis loop before sliding, and the loop's stiffness from end to end.
+"""
 
 
 @dataclass(frozen=True)
 class MeasuredChange:
-    """A measured quantity `before` and `after` the conversion [unit], and its error.
+    """A measured quantity `before` and `after` the conversion of a friction law [unit].
 
-    The error is relative to static friction for curves, and relative to the number itself for numbers. The quantity is
-    kept if the error is below `allowed`. `amplitude` [m] is that of a hysteresis loop.
+    `off` is its error: relative to static friction for curves, and relative to the number itself for numbers. An error
+    of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
     """
 
     kind: MeasuredKind
@@ -57,17 +60,17 @@ class MeasuredChange:
 
     @property
     def kept(self) -> bool:
-        """Tell whether the conversion keeps the measured quantity."""
+        """Tell whether the conversion keeps the measured quantity, within the allowed error."""
         return self.off <= self.allowed
 
 
 @dataclass(frozen=True)
 class LawConversion:
-    """A stage converted to another friction law.
+    """A stage converted to another friction law, and how its measured friction changed.
 
-    It has the source, the compared quantities, and the keys that the measurements leave open, with their ranges [SI].
-    It names the condition of passivity that the law violates ("" if it is passive). `points` are measured points of the
-    virgin curve (None: the curve is that of the source's law).
+    `source` is the original stage. `compared` has the measured quantities before and after, and `open` the ranges [SI]
+    of the keys that the measurements leave open. `active` names the condition of passivity that the law violates ("" if
+    it is passive). `points` are measured points of the virgin curve (None: the curve is that of the original law).
     """
 
     stage: Stage
@@ -81,7 +84,7 @@ class LawConversion:
 
     @property
     def law(self) -> str:
-        """Return the name of the law."""
+        """Return the name of the law to which the stage was converted."""
         return self.stage.flat()["friction.model"]
 
     @property
@@ -91,14 +94,15 @@ class LawConversion:
 
 
 def convertible() -> list[str]:
-    """Return the laws that can be made from measurements, in alphabetical order."""
+    """Return the laws to which friction can be converted, in alphabetical order."""
     return sorted(name for name, law in friction_laws().items() if law.keeping is not FrictionSection.keeping)
 
 
 def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
-    """Compute the measurable friction of a stage given as flat keys, moving forward.
+    """Compute what measurements would show of a stage's friction in forward motion.
 
-    Raises InputError for a law that does not declare it.
+    `flat` has the stage's keys, such as "friction.static", and their SI values. Raises InputError for a friction law
+    that cannot say what would be measured.
     """
     name = flat["friction.model"]
     law = friction_law(name)
@@ -115,9 +119,9 @@ def convert(
 ) -> LawConversion:
     """Replace the friction law of a stage by another that measurements can hardly tell apart.
 
-    `elements` lie side by side, in a law that has several. Before sliding, the stage's own law counts as measured, or
-    the points in the file `virgin`. Raises InputError for a law that cannot be made from measurements, for a stage
-    whose own law does not stick, and for a file that holds no virgin curve of it.
+    A law with parallel elements gets `elements` of them. Before sliding, the stage's own law counts as measured, or the
+    points in the file `virgin`. Raises InputError for a law to which friction cannot be converted, and for a stage
+    whose own law does not stick. It is also raised for a file without a usable virgin curve.
     """
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"
@@ -140,13 +144,13 @@ def convert(
 
 
 def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Tell whether two sets of keys have the same virgin curve."""
+    """Tell whether a law has equal virgin curves with two sets of its keys [SI]."""
     one, two = (measure_friction(with_friction(stage, law, chosen).flat()) for chosen in (keys, other))
     return bool(np.array_equal(one.force, two.force))
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
-    """Return the stage with another friction law and its keys [SI]."""
+    """Return the stage with another friction law and that law's keys [SI]."""
     return stage.replace({"friction": _table(stage, law, keys)})
 
 
@@ -157,10 +161,10 @@ def compared(
     left_open: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     points: VirginPoints | None = None,
 ) -> LawConversion:
-    """Compare a stage `made` from another with the friction measured `before`.
+    """Compare the friction of a converted stage, `made`, with the friction measured `before`.
 
-    `points` are the measured points of the virgin curve, if there are any. The result includes the keys that the
-    measurement leaves open in the new stage.
+    `source` is the stage before conversion. `left_open` are the ranges [SI] of the keys that measurements leave open in
+    the new stage. `points` are the measured points of the virgin curve, if there are any.
     """
     flat = made.flat()
     after = measure_friction(flat)
@@ -177,7 +181,7 @@ def compared(
 
 
 def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[MeasuredChange]:
-    """Yield the changes of area and stiffness of slow loops between both laws.
+    """Yield the changes of slow hysteresis loops between both laws: of their area and stiffness.
 
     The loops have fractions of the deflection at break-away as amplitudes.
     """
@@ -192,7 +196,10 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table [friction] with these keys, in the units of the stage's axis."""
+    """Return the table [friction] of a stage file for a law and its keys [SI].
+
+    Its units are those of the stage's axis.
+    """
     cls, kind = friction_law(law), stage.axis_kind
     table: dict[str, Any] = {"model": law}
     for name, field in numeric_fields(cls).items():
@@ -206,13 +213,16 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
-    """Return the keys of the law's lists among flat keys, without those that are 0."""
+    """Return the keys of a law's lists, such as "friction.element_stiffness.2", that are not 0.
+
+    `flat` has the stage's keys.
+    """
     lists = tuple(f"friction.{name}." for name in list_fields(friction_law(law)))
     return {key for key in flat if key.startswith(lists) and flat[key]}
 
 
 def _text(value: float, unit: str) -> Any:
-    """Return a value as text of a stage file, which reads back as the same number."""
+    """Return a value as text with this unit for a stage file, which reads back exactly."""
     return exactly(value, unit) if unit else value
 
 
@@ -222,7 +232,10 @@ def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> Measu
 
 
 def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
-    """Return steady friction before and after, where both curves differ most, forward or back."""
+    """Return steady friction before and after, at the speed where both laws differ most.
+
+    Motion forward and back is compared.
+    """
     speeds = SPEEDS * before.levels.stribeck_velocity
     old, new = (
         np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
@@ -233,9 +246,9 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
 
 
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
-    """Return the virgin curve before and after, where it differs most.
+    """Return the virgin curve before and after, at the displacement where it differs most.
 
-    It is compared with the curve or the points.
+    The new law is compared with the old curve or, if there are any, the measured points.
     """
     settings = StudySettings.current()
     if not after.stiffness:

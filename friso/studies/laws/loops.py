@@ -29,9 +29,10 @@ class HysteresisLoop:
 
 
 def hysteresis_loop(flat: Mapping[str, Any], amplitude: float, speed: float) -> HysteresisLoop:
-    """Compute the last of several loops of a stage's friction law, given as flat keys.
+    """Compute the last of several hysteresis loops of a stage's friction law.
 
-    A body is moved back and forth at a steady `speed` [m/s], from rest with unbent bristles.
+    `flat` has the stage's keys. A body is moved back and forth by the `amplitude` [m] at a steady `speed` [m/s], from
+    rest with unbent bristles.
     """
     settings = StudySettings.current()
     law, points = flat["friction.model"], settings.points_of_a_loop

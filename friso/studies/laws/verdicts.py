@@ -33,9 +33,9 @@ NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "vi
 
 @dataclass(frozen=True)
 class Trial:
-    """A stage under a law, and its cases by `friso.hunting.check`.
+    """A stage under a friction law, and its cases (joint locked, free) by `friso.hunting.check`.
 
-    `drawn` are the keys [SI] that the measurements leave open, with the values chosen for this trial.
+    `drawn` are the keys that the measurements leave open, with the values [SI] chosen for this trial.
     """
 
     stage: Stage
@@ -52,7 +52,7 @@ class Trial:
         return shown.verdict != "failed" and shown.judgement.hunting.certain
 
     def edge_sought(self, case: str) -> bool:
-        """Tell whether the search for the edge in a case came to its end, with or without an edge."""
+        """Tell whether the search for a case's edge of hunting was finished, with or without edge."""
         shown = self.cases[case]
         judgement = shown.judgement
         unsought = shown.verdict == "failed" or CheckPart.BANDWIDTHS in judgement.given_up
@@ -64,7 +64,8 @@ class Trial:
 class LawVerdict:
     """The verdict on a stage under one friction law.
 
-    It has the conversion to the law, and a trial for each choice of the values that the conversion leaves open.
+    It has the conversion to the law, and one trial for each choice of values for the keys that the conversion leaves
+    open.
     """
 
     conversion: LawConversion
@@ -76,13 +77,13 @@ class LawVerdict:
         return self.conversion.law
 
     def verdicts(self, case: str) -> tuple[str, ...]:
-        """Return the distinct verdicts in a case."""
+        """Return the distinct verdicts of all trials in a case."""
         return tuple(dict.fromkeys(trial.cases[case].verdict for trial in self.trials))
 
     def answers(self, case: str) -> set[bool]:
         """Return the certain answers to whether the stage hunts under the law in a case.
 
-        There are two if the answer depends on keys left open.
+        There are two, true and false, if the answer depends on keys that the measurements leave open.
         """
         return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
 
@@ -93,16 +94,16 @@ class LawVerdict:
     def hunts(self, case: str) -> bool | None:
         """Tell whether the stage hunts under the law in a case.
 
-        None if that is not certain, or depends on keys left open.
+        None if that is not certain, or depends on keys that the measurements leave open.
         """
         answers = self.answers(case)
         return answers.pop() if len(answers) == 1 and self.certain(case) else None
 
     def edges(self, case: str) -> tuple[float, float] | None:
-        """Return the lowest and highest edge of hunting [Hz] in a case; None without any.
+        """Return the lowest and highest edge of hunting in a case; None without any.
 
-        Edges are factors of the bandwidth if there is no crossover. A certain edge is widened by its error to both
-        sides, an uncertain one up to where no attractor was found.
+        Edges are crossovers [Hz], or factors of the bandwidth if there is no crossover. A certain edge is widened by
+        its error to both sides, an uncertain one up to where no attractor was found.
         """
         margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
         units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
@@ -117,12 +118,12 @@ class LawVerdict:
         return (min(lowest), max(highest)) if margins else None
 
     def edges_certain(self, case: str) -> bool:
-        """Tell whether the edges of hunting that were found in a case are certain."""
+        """Tell whether all edges of hunting that were found in a case are certain."""
         margins = [trial.cases[case].judgement.margin for trial in self.trials]
         return all(edge.certain for edge in margins if edge)
 
     def edges_sought(self, case: str) -> bool:
-        """Tell whether the search for the edge in a case came to its end in every trial."""
+        """Tell whether every trial finished its search for the edge of hunting in a case."""
         return all(trial.edge_sought(case) for trial in self.trials)
 
     def amplitudes(self, case: str) -> tuple[float, float] | None:
@@ -134,9 +135,9 @@ class LawVerdict:
 
 @dataclass(frozen=True)
 class VerdictsByLaw:
-    """The verdicts by law, the stage's own first.
+    """The verdicts on a stage under each friction law, its own first.
 
-    `left_out` lists the laws that do not keep the measured friction, with the quantities that they lose.
+    `left_out` lists the laws that do not keep the stage's measured friction, with the quantities that they lose.
     """
 
     stage: Stage
@@ -151,17 +152,20 @@ class VerdictsByLaw:
     def hunts(self, case: str) -> bool | None:
         """Tell whether the stage hunts in a case under all laws.
 
-        The result is None if that depends on the law or is not certain.
+        None if that depends on the law, or is not certain.
         """
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
     def answers(self, case: str) -> set[bool]:
-        """Return all certain answers to whether the stage hunts in a case."""
+        """Return all certain answers, of any law, to whether the stage hunts in a case."""
         return set().union(*(verdict.answers(case) for verdict in self.verdicts))
 
     def depends_on_law(self, case: str) -> bool:
-        """Tell whether certain verdicts differ in a case."""
+        """Tell whether the stage certainly hunts in some trials of a case, and surely not in others.
+
+        Trials differ in the law, or in keys that the measurements leave open.
+        """
         return len(self.answers(case)) > 1
 
     def uncertain(self, case: str) -> list[str]:
@@ -169,10 +173,11 @@ class VerdictsByLaw:
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """Return the experiments that would decide between different answers of friction laws.
+        """Return the experiments that would decide whether the stage hunts in a case.
 
-        If the answer depends on keys left open in a law, these experiments determine the keys. Otherwise they separate
-        laws that disagree, or are not certain, from the others.
+        There are none if all laws agree, or if no answer is certain. If the answer depends on keys left open in a law,
+        the experiments determine the keys. Otherwise they separate the laws that disagree, or are not certain, from the
+        others.
         """
         if self.hunts(case) is not None or not self.answers(case):
             return []
@@ -197,9 +202,10 @@ class VerdictsByLaw:
 def verdicts_by_law(
     stage: Stage, rtol: float = LONG_RUN_RTOL, elements: int = ELEMENTS, progress: Progress = silent
 ) -> VerdictsByLaw:
-    """Check a stage under each law that keeps its measured friction.
+    """Check a stage for hunting under each friction law that keeps its measured friction.
 
-    Raises InputError for a law that does not declare measurable friction.
+    Laws with parallel elements get `elements` of them. Raises InputError for a stage whose law cannot say what would be
+    measured.
     """
     conversions, left_out = kept_laws(stage, elements)
     planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
@@ -221,7 +227,8 @@ def verdicts_by_law(
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
     """Return the stage under all laws that keep its measured friction, its own first.
 
-    Also returns what the other laws lose.
+    Also returns, for every other law, the measured quantities that it loses. Laws with parallel elements get `elements`
+    of them.
     """
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
@@ -245,11 +252,12 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 
 
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
-    """Return the friction of stages under each other law that keeps their measured friction.
+    """Return friction keys of stages under each other law that keeps their measured friction.
 
-    The stages differ in numbers of their friction. Friction is given as converted, and at both ends of the range of
-    each key left open, by the names of law and key. Laws that keep the measured friction of some stages only are left
-    out. Raises InputError for a law that does not declare measurable friction.
+    The stages differ in numbers of their friction. The keys' values [SI] are as converted and, for each key that
+    measurements leave open, at both ends of its range. They come by the names of law and key. Laws that keep the
+    measured friction of some stages only are left out. Raises InputError for a stage whose law cannot say what would be
+    measured.
     """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
@@ -270,15 +278,15 @@ def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> Ot
 
 
 def _together(values: Sequence[Any]) -> Any:
-    """Return the common value, or an array of different values."""
+    """Return the value that all stages have in common, or an array if they differ."""
     return values[0] if all(value == values[0] for value in values) else np.array(values)
 
 
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
-    """Return the values [SI] to try for keys left open, by name of the trial.
+    """Return the values [SI] to try for the keys that measurements leave open, by trial.
 
-    The measurements leave them open. "" is as converted; "least" and "most" are at the ends of the range of a key. The
-    stage's own law has one trial.
+    The trial "" is as converted; "least" and "most" are at the ends of each key's range. The stage's own law has one
+    trial.
     """
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:

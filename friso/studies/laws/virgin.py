@@ -1,4 +1,4 @@
-"""Read a measured virgin curve: points of force over displacement from rest.
+"""Read a measured virgin curve: points of friction force over displacement from rest.
 
 It replaces the virgin curve of the stage's friction law.
 """
@@ -29,10 +29,11 @@ ELSEWHERE = (-0.2, -0.1, -0.05, 0.05, 0.1, 0.2)
 
 @dataclass(frozen=True)
 class VirginPoints:
-    """Points of a virgin curve.
+    """Measured points of a virgin curve (friction force over displacement from rest).
 
     `displacement` [m] and `force` [N] have the shape (n,). `scatter` [N] is the standard deviation of the force about a
-    curve. The range of the initial slope [N/m] reaches to infinity if the points lie too far from rest.
+    smooth curve. `stiffness` [N/m] is the range of the initial slope, up to infinity if the points lie too far from
+    rest.
     """
 
     displacement: np.ndarray
@@ -41,15 +42,16 @@ class VirginPoints:
     stiffness: tuple[float, float]
 
     def means(self, force: np.ndarray) -> np.ndarray:
-        """Return forces [N] at the displacements, shape (n,), averaged over neighbouring points.
+        """Return forces at the displacements [N], averaged over neighbouring points.
 
-        The average is over enough points to suppress scatter.
+        `force` has the shape (n,). An average is over `together` points, enough to suppress scatter, so the result is
+        shorter.
         """
         return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
 
     @property
     def together(self) -> int:
-        """Return the number of points in a mean."""
+        """Return the number of neighbouring points in an average."""
         settings = StudySettings.current()
         wanted = (self.usual / (settings.curve_error * max(self.force))) ** 2
         return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // settings.most_knots, 1)))
@@ -61,10 +63,10 @@ class VirginPoints:
 
 
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
-    """Read displacement [m] from rest and force [N], both (n,), from any log format.
+    """Read displacement [m] from rest and force [N], both (n,), from a file in any log format.
 
     The file has one channel of each, recognised by their units for this `kind` of axis. Raises InputError or LogError
-    for a file that holds none.
+    for a file without such a curve.
     """
     settings = StudySettings.current()
     channels = read_table(Path(path)).channels
@@ -93,7 +95,10 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
 
 
 def _channel(path: str | os.PathLike[str], candidates: list[tuple[np.ndarray, float | None]], unit: str) -> np.ndarray:
-    """Return the only channel that can be converted to a unit, in that unit."""
+    """Return the values of the only channel that can be converted to a unit, in that unit.
+
+    `candidates` are values and their factors to this unit. Raises InputError if none can be converted, or several.
+    """
     in_unit = [values * factor for values, factor in candidates if factor is not None]
     if len(in_unit) != 1:
         raise _refused(
@@ -109,11 +114,11 @@ def _refused(path: str | os.PathLike[str], actual: str, expected: str) -> InputE
 def with_virgin_curve(
     measured: MeasuredFriction, displacement: np.ndarray, force: np.ndarray
 ) -> tuple[MeasuredFriction, VirginPoints]:
-    """Return measured friction with the points [m, N], both of shape (n,), as its virgin curve.
+    """Replace the virgin curve of measured friction by points [m, N], both of shape (n,).
 
-    The curve is the nearest one that springs can have which slip one after the other: concave, from 0 to static
-    friction, by least squares. It is straight between few points and smooth through many. Raises InputError for points
-    that contradict static friction.
+    The new curve is the nearest one of springs that slip one after the other: concave, from 0 to static friction, by
+    least squares. It is straight between few points and smooth through many. Also returns the points with their
+    scatter. Raises InputError for points that contradict static friction.
     """
     settings = StudySettings.current()
     static = measured.levels.static
@@ -155,5 +160,5 @@ def with_virgin_curve(
 
 
 def _scatter(residual: np.ndarray) -> float:
-    """Return the standard deviation of the rough part of a residual, shape (n,)."""
+    """Return the standard deviation of the rough part of a curve's residual, shape (n,)."""
     return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2))

@@ -16,7 +16,7 @@ CRITERION = (
 
 
 def attractors(stage: StageEvidence) -> np.ndarray:
-    """Return a word for each cell, shape (cells,)."""
+    """Say what attracts the stage of each cell: cycle, swing, nothing or unknown; (cells,)."""
     attracted = stage.attracted
     kind = np.where(attracted.attracts, np.where(attracted.closed, "cycle", "swing"), "nothing")
     return np.where(attracted.certain, kind, "unknown").astype(object)

@@ -1,4 +1,4 @@
-"""Peaks of a run that are distinct, counted after the thesis"""
+"""Peaks counted as in the thesis, but without ripple of less than 1 µm"""
 
 from friso.hunting.criteria import DISTINCT_CRITERION
 from friso.studies.metric import MapFinding, Metric

@@ -1,4 +1,4 @@
-"""Whether the stage hunts, by coarse return maps, and by closed orbits where these are in doubt"""
+"""Whether the stage hunts, by coarse return maps, or by closed orbits if maps do not decide"""
 
 from dataclasses import replace
 

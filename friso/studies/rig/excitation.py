@@ -18,11 +18,13 @@ from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import standing
 
 PERIOD, PERIODS = 8.0, 8
-"""Period of the multisine in periods of the crossover, and number of periods. The period is the inverse of the lowest
-line (1 Hz on the thesis's rig)."""
+"""Period of the multisine in periods of the crossover, and number of periods.
+
+The period is the inverse of the multisine's lowest frequency (1 Hz on the thesis's rig).
+"""
 
 FINEST = 0.4
-"""Highest line of the multisine over the sampling rate of the log."""
+"""Highest frequency of the multisine over the sampling rate of the log."""
 
 PHASES = int.from_bytes(b"sines")
 """Second half of the random generator's key for the phases of the multisine."""
@@ -30,11 +32,11 @@ PHASES = int.from_bytes(b"sines")
 
 @dataclass(frozen=True)
 class Excitation:
-    """Excitation of a frequency response.
+    """Sizes of a multisine, the sum of sines with which a frequency response is measured.
 
-    `strength` is the RMS of the injected force over static friction. Further fields are the highest line over the
-    crossover, the approximate number of lines, spaced evenly in the logarithm, and samples of the log per period of the
-    crossover.
+    `strength` is the RMS of the injected force over static friction, and `top` the highest frequency over the
+    crossover. `lines` is the approximate number of frequencies, spaced evenly in the logarithm. `samples` are those of
+    the log per period of the crossover.
     """
 
     strength: float
@@ -56,9 +58,10 @@ def excite(
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
 ) -> RecordedRuns:
-    """Excite runs at a standstill at a place [m] with the multisine of a seed.
+    """Run the stage at a standstill at a place [m], with the multisine of a seed injected.
 
-    `changes` are arrays of shape (runs,).
+    `changes` of keys are arrays of shape (runs,), and `kind` the sizes of the multisine. Returns the recorded runs,
+    which share a seed.
     """
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow
@@ -70,9 +73,9 @@ def excite(
 
 
 def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
-    """Return a period of a sum of sines at whole `lines`, with RMS 1 and random phases.
+    """Return one period of a sum of sines with equal amplitudes, random phases and RMS 1.
 
-    All have one amplitude; the period has `count` samples.
+    The period has `count` samples. `lines` are the sines' whole numbers of turns in it.
     """
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(lines))
     spectrum = np.zeros(count // 2 + 1, complex)
@@ -82,9 +85,9 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
-    """Estimate the response from commanded force to position, indirectly, over realisations.
+    """Estimate the response from commanded force to position, averaged over several logs.
 
-    Raises InputError for a loop that was not stable.
+    It is estimated indirectly, by way of the injected force. Raises InputError for a log of a loop that was not stable.
     """
     for log in logs:
         if log.failure:
@@ -93,7 +96,7 @@ def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
 
 
 def loop(log: RigLog) -> FrequencyResponse:
-    """Estimate the open loop: the controller's force over the total force, sign reversed."""
+    """Estimate the open loop from one log: the controller's force over the total, sign reversed."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
     record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
     return multisine([record], None, Channels("error", "1", "loop", "1"))

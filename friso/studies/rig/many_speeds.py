@@ -1,9 +1,9 @@
 """Run passes at many speeds with a locked joint: the whole curve of friction over velocity.
 
 Where friction falls with speed a slow loop sticks and slips, so its passes show no steady friction. A faster controller
-damps more, so a few settings are tried, and the fastest one at which most passes are steady is taken. All passes cover
-one stretch, so that they differ in speed and not in place. Fast passes begin before the stretch and end behind it, if
-necessary beyond the stage's own travel, because the rig's rail has no ends.
+damps more, so a few crossovers are tried, and the fastest one at which most passes are steady is taken. All passes
+cover one stretch of the rail, so that they differ in speed and not in place. Fast passes begin before the stretch and
+end behind it, if necessary beyond the stage's own travel, because the rig's rail has no ends.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SHORTEST = 20.0
 """Periods of the crossover for the longest way at the highest speed."""
 
 MOST = 0.5
-"""Least fraction of steady passes at an accepted setting."""
+"""Least fraction of steady passes at an accepted crossover."""
 
 SHARED, PLACES = 1 / 8, 3
 """Stretch that all passes cover, as a fraction of the longest, and number of places along the travel (friso's
@@ -53,10 +53,10 @@ stage's own crossover (2 ms)."""
 
 @dataclass(frozen=True)
 class PlaceOnRail:
-    """Passes over one stretch of the rail.
+    """Passes at many speeds over one stretch of the rail.
 
-    It has the log, its evaluation, and the true mean dynamic friction with drag [N] at speeds [m/s], both of shape
-    (n,), over that stretch.
+    It has the log and its evaluation. `true` is the true mean friction [N] over the stretch, with a cable's drag, at
+    `speeds` [m/s], both of shape (n,).
     """
 
     log: RigLog
@@ -66,9 +66,9 @@ class PlaceOnRail:
 
     @property
     def friction(self) -> np.ndarray:
-        """Return friction [N] of the steady passes, shape (passes,), without constant forces.
+        """Return the friction [N] of the steady passes, shape (passes,), without constant forces.
 
-        The pull of a cable, for example, does not turn with the motion.
+        A constant force, such as the pull of a cable, does not turn with the motion.
         """
         bias = self.velocity.bias.value if self.velocity.bias.determined else 0.0
         return np.abs(self.velocity.forces - bias)
@@ -83,7 +83,10 @@ class ManySpeeds:
 
 
 def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
-    """Return the passes of a stage whose joint is locked, or which has none."""
+    """Run passes at many speeds, and return their results at each place.
+
+    The stage's joint is locked, or there is none.
+    """
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
         velocity = friction_velocity(log.log, moving_mass(stage.flat()))
@@ -97,9 +100,9 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
 
 
 def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
-    """Return the logs at the fastest setting at which most passes are steady, one per place.
+    """Return logs of passes at the fastest crossover at which most are steady, one per place.
 
-    If there is none, the setting with the most steady passes is taken.
+    If there is no such crossover, the one with the most steady passes is taken.
     """
     tried = []
     for factor in FASTER:
@@ -113,7 +116,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
 
 
 def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return mean dynamic friction [N] at speeds [m/s], shape (n,), over places [m] on the rail."""
+    """Return the mean dynamic friction [N] over rail `places` [m], at speeds [m/s], shape (n,)."""
     flat: Mapping[str, Any] = anywhere(stage.flat())
     levels = zip(("friction.static", "friction.coulomb"), friction_factors(flat, places).mean(axis=1), strict=True)
     along = {key: flat[key] * factor for key, factor in levels if key in flat}
@@ -121,19 +124,25 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 
 
 def _begins(stage: Stage) -> np.ndarray:
-    """Return where the stretches begin [m]."""
+    """Return the positions [m] at which the stretches of rail begin, (PLACES,)."""
     low, high = travel(stage)
     return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
 
 def controller_speeds(stage: Stage) -> np.ndarray:
-    """Return the speeds [m/s], shape (`SPEEDS`,), for a stage whose controller was made faster."""
+    """Return the speeds [m/s] of the passes, shape (`SPEEDS`,), rising.
+
+    The stage is one whose controller was made faster.
+    """
     top = longest_travel(stage) * pace(stage) / SHORTEST
     return np.geomspace(top / RATIO, top, SPEEDS)
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
-    """Return the passes over the stretch from a place [m], in order of rising speed."""
+    """Return the log of passes over a stretch from `low` [m], in order of rising speed.
+
+    `own_pace` is the crossover [Hz] of the user's stage, and `number` the index of the stretch.
+    """
     period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
     for speed in controller_speeds(stage):

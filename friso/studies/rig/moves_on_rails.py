@@ -1,4 +1,4 @@
-"""Run moves of a machine on repeated rails, and evaluate the final swings."""
+"""Run moves of a machine on rails of several seeds, and evaluate how they end."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
 def distance(stage: Stage) -> float:
-    """Return the distance [m] of the move: the stage's own, rounded to 1, 2 or 5 times 10^n.
+    """Return the distance [m] of a stage's move: its motion's, rounded to 1, 2 or 5 times 10^n.
 
-    It is 100 mm for the 90 mm of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere.
+    It is 100 mm for the 90 mm of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that does not move.
     """
     exact = float(motion.size(stage.flat()))
     if not exact:
@@ -51,12 +51,12 @@ def distance(stage: Stage) -> float:
 
 
 def duration(stage: Stage) -> float:
-    """Return the duration of a run [s]."""
+    """Return the duration of a run of a stage [s], at least that of the thesis."""
     return max(DURATION, float(stage.flat()["motion.duration"]))
 
 
 def move(stage: Stage) -> MoveTask:
-    """Return the move from 0 with the acceleration of the stage's motion, standing afterwards.
+    """Return the move from 0 with the acceleration of the stage's motion, then a stand.
 
     A motion that states no acceleration gets one that the loop can just follow: a move then takes two time constants of
     the loop.
@@ -69,14 +69,14 @@ def move(stage: Stage) -> MoveTask:
 
 
 def released(stage: Stage, displacement: float) -> MoveTask:
-    """Return a release at the end of the move, from `displacement` [m] beside it."""
+    """Return the task of a release at the end of the move, from `displacement` [m] beside it."""
     return MoveTask(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
 
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
-    """Return the stage with its joint locked or free.
+    """Return the stage with its joint locked, or free.
 
-    Raises InputError if it has no such joint.
+    Raises InputError if it has no joint, or none that can be free.
     """
     return locked_stage(stage) if locked else free_stage(stage)
 
@@ -84,15 +84,15 @@ def with_joint(stage: Stage, locked: bool) -> Stage:
 def crossover(stage: Stage) -> float:
     """Return the crossover of the stage's controller [Hz].
 
-    Raises InputError for one that is given by its gains.
+    Raises InputError for a controller that has gains instead.
     """
     return float(stage.flat()[crossover_key(stage)])
 
 
 def crossover_key(stage: Stage) -> str:
-    """Return the key that states the crossover.
+    """Return the key that states the crossover of the stage's controller.
 
-    Raises InputError for a controller that is given by its gains.
+    Raises InputError for a controller that has gains instead.
     """
     key = stage.controller.bandwidth_key
     if key is None:
@@ -102,19 +102,19 @@ def crossover_key(stage: Stage) -> str:
 
 
 def at_crossovers(stage: Stage, frequencies: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the keys of the controller at crossovers [Hz], with values of the same shape.
+    """Return the controller's keys at crossovers [Hz], with SI values of their shape.
 
-    A controller that states none is made faster as a whole, from the crossover of a van Dijk controller with the same
-    proportional gain (`pace`).
+    A controller that states no crossover is made faster as a whole, from the crossover of a van Dijk controller with
+    the same proportional gain (`pace`).
     """
     key = stage.controller.bandwidth_key
     return quicker(stage, frequencies / pace(stage)) if key is None else {key: frequencies}
 
 
 def rails(stage: Stage) -> np.ndarray:
-    """Return the random seeds of the rails, shape (rails,), beginning with the stage's own.
+    """Return the seeds of the rails on which a machine is repeated, the stage's own first.
 
-    A stage whose friction does not vary along the rail gets a single NaN.
+    A stage whose friction does not vary along the rail has a single NaN.
     """
     if stage.rail is None:
         return np.array([np.nan])
@@ -122,9 +122,9 @@ def rails(stage: Stage) -> np.ndarray:
 
 
 def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
-    """Repeat changes of cases, each (cases,), on every rail: (cases * rails,).
+    """Repeat each case's changes of keys, (cases,), on every rail: (cases * rails,).
 
-    Rails vary fastest.
+    Rails, by their `seeds`, vary fastest.
     """
     count = len(next(iter(cases.values())))
     repeated = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
@@ -132,7 +132,10 @@ def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -
 
 
 def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
-    """Return noise seeds for cases on machines; a machine has one seed in all cases."""
+    """Return the noise seeds of cases on machines, machines varying fastest.
+
+    A machine has the same noise in all cases.
+    """
     return [seed + machine for _ in range(cases) for machine in range(machines)]
 
 
@@ -145,8 +148,8 @@ class RailRuns:
     - `swing` [m], peak to peak, and `period` [s] of the last quarter (NaN: none).
     - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
     - `rising`: fraction of the period in which the deviation rises.
-    - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: of the heights over the swing
-      (NaN with fewer than three swings).
+    - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: standard deviation of the
+      heights over the swing (NaN with fewer than three swings).
 
     Runs that failed have NaN, and no peaks.
     """
@@ -173,20 +176,26 @@ class RailRuns:
 
     @property
     def counted(self) -> np.ndarray:
-        """Return which runs have a peak that counts."""
+        """Return which runs have a distinct peak."""
         return self.peaks > 0
 
     def shaped(self, *shape: int) -> RailRuns:
-        """Return the results with arrays of another shape."""
+        """Return the results with their arrays in another shape."""
         return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
-        """Return the fraction of some runs that have a counted peak, with its 95 % interval."""
+        """Return the fraction of runs with a counted peak, and its 95 % interval.
+
+        `which` are the indices of the runs, by default all.
+        """
         return share(self.counted[which], ~self.failed[which])
 
 
 def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> RecordedRuns:
-    """Run a task once for each seed, and keep all samples."""
+    """Run a task once for each seed of the noise, and keep all samples.
+
+    `changes` of keys are SI numbers, or arrays with one value for each run.
+    """
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
 
@@ -206,7 +215,10 @@ def run_moves(
     progress: Progress = silent,
     label: str = "",
 ) -> RailRuns:
-    """Run a task and evaluate the runs; samples are dropped chunk by chunk."""
+    """Run a task once for each seed, and evaluate the runs without keeping their samples.
+
+    `changes` of keys are SI numbers, or arrays with one value for each run.
+    """
     parts: list[RailRuns] = []
     progress(0, len(seeds), label)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
@@ -238,7 +250,10 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and values [m] of turning points; a flat stretch counts at its end."""
+    """Return times [s] and values [m] of the turning points of a sampled deviation.
+
+    A flat stretch counts as a turn at its end.
+    """
     ways = np.sign(np.diff(values))
     moving = np.flatnonzero(ways)
     turned = moving[1:][ways[moving[1:]] * ways[moving[:-1]] < 0]
@@ -246,10 +261,10 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Return the shape of the last half's swings: above, below, rising, and two scatters.
+    """Return the shape of the swings in a run's last half, NaN if it does not swing.
 
-    `RailRuns` describes them. They follow from turning points, times [s] and values [m]; the scatters are those of
-    period and height.
+    The five numbers are `above`, `below`, `rising`, `period_scatter` and `height_scatter` of `RailRuns`. They follow
+    from turning points, times [s] and values [m], and the `swing` peak to peak. The run `ended` at a time [s].
     """
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):

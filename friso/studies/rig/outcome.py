@@ -1,4 +1,4 @@
-"""Outcome of an experiment of the rig: logs, the truth behind each, and their analysis."""
+"""Outcome of an experiment of the rig: logs, the true motion behind each, and the analysis."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from friso.virtual_rig.run import RecordedRuns
 
 @dataclass(frozen=True)
 class RigLog:
-    """A log as the drive writes it, with the truth behind it.
+    """A log as the drive writes it, with the true motion behind it.
 
-    It has a name, the kind of experiment for `friso identify` (None: recognised from the log), the sample time [s],
-    logged and true SI arrays of shape (n,) by role, the stage that ran, the seed of its noise, and why the run ended
-    early ("": it did not).
+    `kind` is the kind of experiment for `friso identify` (None: recognised from the log), and `interval` the sample
+    time [s]. `logged` and `true` are SI arrays of shape (n,) by role, such as "position". Further fields are the stage
+    that ran, the seed of its noise, and why the run ended early ("": it did not).
     """
 
     name: str
@@ -37,7 +37,7 @@ class RigLog:
 
     @property
     def log(self) -> Log:
-        """Return the log as `friso identify` reads it."""
+        """Return the log as `friso identify` reads it, without the true motion."""
         return record(self.name, self.interval, **self.logged)
 
 
@@ -54,7 +54,10 @@ class Outcome:
 
 
 def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
-    """Return one run of a chunk as a log, up to a failure."""
+    """Return one run of a chunk, in `row`, as a log up to a failure.
+
+    It ends early too if the command swings between its limits from then on.
+    """
     status = int(recorded.statuses[row])
     count = recorded.logged["position"].shape[1]
     if status != Status.DONE:
@@ -72,19 +75,21 @@ def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage
 
 
 def stopped(log: RigLog) -> InputError:
-    """Return the error of a log that stopped before it shows anything."""
+    """Return the error for a log that stopped before it shows anything."""
     return InputError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
 
 
 WINDOWS, SATURATED = 20, 0.1
-"""Number of parts into which a log is divided in the test for stability, and the fraction of a part that the command of
-an unstable loop spends at either limit."""
+"""Number of parts into which a log is divided to test stability, and a fraction of a part.
+
+The command of an unstable loop spends at least this fraction of a part at its two limits.
+"""
 
 
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
-    """Return the number of samples after which a command [N] only swings between limits.
+    """Return the number of samples after which a command [N] only swings between its limits.
 
-    The command has shape (n,). It is 0 if the command comes to rest, or has no limits.
+    `force` has the shape (n,). The result is 0 if the command does not end so, or has no limits.
     """
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)

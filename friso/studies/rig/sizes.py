@@ -1,4 +1,4 @@
-"""Choose sizes, durations and places of the experiments from the stage.
+"""Choose sizes, durations and places of the rig's experiments from the stage.
 
 Times are in periods of the controller's crossover, distances in lengths of the stage's own motion, deflections in
 strokes, and forces in friction forces. On the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) the values are those of the thesis.
@@ -19,7 +19,10 @@ from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import own_motion
 
 WIDE = 8.0
-"""Stroke during identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
+"""Stroke during identification over the stage's own stroke.
+
+It is 8 mm in the thesis (Sec. 4.2.1), "for safety reasons".
+"""
 
 WAY = 5 / 3
 """Way at constant speed over the length of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
@@ -66,7 +69,7 @@ def free_stage(stage: Stage) -> Stage:
 
 
 def locked_stage(stage: Stage) -> Stage:
-    """Return the stage with its joint held. Raises InputError where it has none."""
+    """Return the stage with its joint held. Raises InputError if it has no joint."""
     return jointed(stage).replace({"joint.locked": True})
 
 
@@ -90,7 +93,7 @@ def friction(stage: Stage) -> float:
 def travel(stage: Stage) -> tuple[float, float]:
     """Return the two ends [m] of the stage's own motion.
 
-    If the motion does not move, the travel is a hundred strokes to either side.
+    If the motion does not move, they are a hundred strokes to either side of it.
     """
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
@@ -98,13 +101,13 @@ def travel(stage: Stage) -> tuple[float, float]:
 
 
 def longest_travel(stage: Stage) -> float:
-    """Return the way at constant speed [m]."""
+    """Return the length [m] of the way at constant speed."""
     low, high = travel(stage)
     return WAY * (high - low)
 
 
 def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
-    """Return the keys of a controller made faster by factors."""
+    """Return the keys of the stage's controller made faster by `factors`, with SI values."""
     return sped_up(stage.flat(), factors)
 
 

@@ -1,7 +1,7 @@
-"""Run slow sliding with a locked joint, where no controller holds a constant speed.
+"""Run slow sliding with a locked joint, so slow that no controller holds a constant speed.
 
-There friction falls steeply with speed. Short, finely logged passes follow those of `many_speeds`, at speeds at the
-limit of steady motion: the motion swings through the whole falling branch.
+At such speeds friction falls steeply. Short, finely logged passes follow those of `many_speeds`, at speeds at the limit
+of steady motion: the motion swings through the whole falling branch of the friction curve.
 """
 
 from __future__ import annotations
@@ -25,25 +25,30 @@ from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
 
 UNSTEADY, STEADY, PLACES = 2, 1, 8
-"""Numbers of speeds: UNSTEADY, the fastest that were not steady, and STEADY, the slowest that were; and number of
-places along the travel, because each log shows the friction of a few millimetres."""
+"""Numbers of speeds and places.
+
+UNSTEADY is the number of the fastest speeds that were not steady, and STEADY that of the slowest that were. PLACES is
+the number of places along the travel, because each log shows the friction of a few millimetres.
+"""
 
 APART = 4
 """Number of speeds skipped at a time, from the lowest on, if motion was steady at all speeds."""
 
 POINTS = 500
-"""Points of a way for its mean friction."""
+"""Number of points along a way at which its mean friction is computed."""
 
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
-"""Periods of the stage's own crossover for which each speed lasts, and for which the reference stands before; samples
-per period (0.4 s, 0.125 s and 0.1 ms on the thesis's rig)."""
+"""Periods of the stage's crossover for which each speed lasts, and for the stand before.
+
+SAMPLES are those of the log per period. On the thesis's rig these are 0.4 s, 0.125 s and 0.1 ms.
+"""
 
 
 @dataclass(frozen=True)
 class Slow:
     """Log of slow sliding at a place, and its evaluation with true mass and bristles.
 
-    The true mean Coulomb and static friction [N] over its way have the shape (2,).
+    `true` has the true mean Coulomb and static friction [N] over the log's way, shape (2,).
     """
 
     log: RigLog
@@ -52,14 +57,18 @@ class Slow:
 
 
 def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slow, ...]:
-    """Run slow sliding of a stage with a locked joint or none, after passes at many speeds."""
+    """Run slow sliding of a stage, and evaluate its logs; the joint is locked, if there is one.
+
+    `passed` are the logs of passes at many speeds.
+    """
     return tuple(Slow(log, _analysed(log), _true(log)) for log in slow_sliding_logs(stage, passed, seed))
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
     """Return logs of slow sliding, one for each place.
 
-    There are none if friction has no bristles and Stribeck curve, or no loop was stable.
+    `passed` are the logs of passes at many speeds, which decide the speeds. There are none if friction lacks bristles
+    or a Stribeck curve, or if no loop was stable.
     """
     speeds, quick = _edge(passed), passed[0].stage
     falling_bristles = {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= quick.flat().keys()
@@ -75,7 +84,10 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
-    """Return speeds [m/s] at the limit of steady motion, or the lowest if all were steady."""
+    """Return speeds [m/s] at the limit of steady motion, or low ones if all passes were steady.
+
+    `passed` are the logs of passes at many speeds.
+    """
     speeds = controller_speeds(passed[0].stage)
     unsteady = {
         int(np.argmin(np.abs(np.log(speeds / abs(stretch.velocity)))))

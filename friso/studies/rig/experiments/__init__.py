@@ -1,4 +1,7 @@
-"""Experiments of the rig by name, as `friso rig` takes them: one file each, which declares how it is run."""
+"""Experiments of the rig by name, as `friso rig` takes them.
+
+Each is one file, which declares how it is run.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Force at constant speed along the rail.
+"""Friction force at constant speed along the rail.
 
-Thesis, Sec. 4.2.3, Fig. 21; what it does not show, and what more speeds do.
+Thesis, Sec. 4.2.3, Fig. 21. More speeds than the thesis's two show friction over velocity.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ DURATIONS = (480.0, 120.0)
 
 @dataclass(frozen=True)
 class Passes:
-    """Results of passes at constant speed, with the joint as in `name`.
+    """Results of passes at constant speed along the rail, with the joint "free" or "locked".
 
-    They are friction over place and friction over velocity. `true` is the true mean dynamic friction [N] over the way
-    at the two speeds, shape (2,).
+    They are friction over position and friction over velocity. `true` is the true mean dynamic friction [N] over the
+    way, at the two speeds, shape (2,).
     """
 
     name: str
@@ -44,8 +44,8 @@ class Passes:
 class ConstantSpeedResult:
     """Results of the experiment at constant speed.
 
-    `speeds` [m/s] are the two speeds of the thesis, `cases` the passes at these speeds with the joint free and locked,
-    `many` the passes at many speeds, and `slow` the slow sliding, empty if friction has no bristles.
+    `speeds` [m/s] are the two speeds of the thesis, and `cases` the passes at these speeds with the joint free and
+    locked. `many` are passes at many speeds. `slow` is the slow sliding, empty if friction has no bristles.
     """
 
     speeds: tuple[float, ...]
@@ -75,7 +75,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def pass_speeds(stage: Stage) -> tuple[float, ...]:
-    """Return the speeds [m/s], the slow one first."""
+    """Return the two speeds [m/s] of the thesis for a stage, the slow one first."""
     return tuple(longest_travel(stage) * pace(stage) / periods for periods in DURATIONS)
 
 
@@ -90,7 +90,10 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
 
 
 def passes_log(name: str, stage: Stage, seed: int) -> RigLog:
-    """Return the log of passes to and fro at both speeds; `name` says whether the joint is free."""
+    """Return the log of passes to and fro at both speeds of the thesis.
+
+    `name` says whether the joint of the stage is free or locked.
+    """
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):

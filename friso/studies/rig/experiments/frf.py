@@ -1,6 +1,6 @@
-"""Frequency responses of the plant, locked at ten places and free; open loops over the crossover.
+"""Frequency responses of the plant, locked at ten places and free, and of open loops.
 
-By closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29).
+They are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29), open loops at several crossovers.
 """
 
 from __future__ import annotations
@@ -25,29 +25,33 @@ PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""
 
 SETTINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
-"""Crossovers over the stage's own: 8 to 48 Hz (Fig. 22)."""
+"""Crossovers of the open loops over the stage's own: 8 to 48 Hz (Fig. 22)."""
 
 RATIOS = (1.0, 0.68, 1.47)
 """Ratios of true to assumed motor constant that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
 
 BESIDE = 3.0
-"""Distance of the free joint's mass line from its first mode, and from the parasitic mode, as factors of frequency."""
+"""Factor in frequency between the free joint's mass line and the modes on both sides of it."""
 
 FASTER, STEPS = 1.1, 33
-"""Factor between successive settings that are tried for stability, and their number. They begin at a third of the
-highest of `SETTINGS`."""
+"""Factor between successive crossovers that are tried for stability, and their number.
+
+They begin at a third of the highest of `SETTINGS`.
+"""
 
 RELEASED, WAIT = 0.01, 8.0
-"""Distance of the free stage from its reference at release, in strokes, and duration in periods of the stage's
-crossover. A loop with a larger error in the last quarter is not stable."""
+"""Distance of the free stage from its reference at release, in strokes, and run duration.
+
+The duration is in periods of the stage's crossover. A loop with a larger error in the last quarter is not stable.
+"""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """The plant as identified: each identification, and their combination.
+    """The plant as identified from several logs: one response each, and their average.
 
-    It has the frequency [Hz] of the first mode of a free joint (NaN: locked), and the mass line with its frequency
-    range [Hz].
+    It has the frequency [Hz] of the first mode of a free joint (NaN: locked). `mass` is that of the mass line (where
+    force over acceleration is constant), and `band` its frequency range [Hz].
     """
 
     single: tuple[FrequencyResponse, ...]
@@ -59,9 +63,9 @@ class Plant:
 
 @dataclass(frozen=True)
 class MeasuredLoop:
-    """An open loop tuned to a crossover [Hz], and its true 0 dB crossing [Hz].
+    """A measured open loop, with the crossover [Hz] it was tuned to and its 0 dB crossings.
 
-    It has no lines if the closed loop was not stable.
+    The response has no frequencies if the closed loop was not stable.
     """
 
     tuned: float
@@ -70,7 +74,7 @@ class MeasuredLoop:
 
     @property
     def measured(self) -> bool:
-        """Tell whether any response was measured."""
+        """Tell whether a response was measured, so the closed loop was stable."""
         return len(self.response.frequency) > 0
 
 
@@ -78,9 +82,9 @@ class MeasuredLoop:
 class Frf:
     """Results of the frequency-response experiment.
 
-    They are the plants, the open loops, locked at several settings and free, and apparent masses [kg], shape (2,
-    ratios), locked and free, for the motor constants of `RATIOS`. For the free joint there are also the tried settings
-    [Hz], shape (STEPS,), and which of them were stable.
+    They are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2, ratios),
+    are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings` [Hz], shape
+    (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
     """
 
     locked: Plant
@@ -93,27 +97,27 @@ class Frf:
 
     @property
     def highest_stable(self) -> float:
-        """Return the highest setting [Hz] below the first unstable one; NaN for none."""
+        """Return the highest crossover [Hz] below the first unstable one, joint free; NaN for none."""
         return highest_stable(self.settings, self.stable)
 
 
 def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
-    """Return the last of rising settings before the first unstable one, both (n,).
+    """Return the last of rising `settings` (n,) before the first unstable one.
 
-    It is NaN if the first one is unstable.
+    `stable` (n,) says which are stable. The result is NaN if the first one is unstable.
     """
     first = len(stable) if stable.all() else int(np.argmin(stable))
     return float(settings[first - 1]) if first else np.nan
 
 
 def crossing_near_target(loop: MeasuredLoop) -> float:
-    """Return the 0 dB crossing [Hz] nearest to the tuned crossover; NaN for none."""
+    """Return the 0 dB crossing [Hz] of a loop nearest to its tuned crossover; NaN for none."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Identify all plants and loops, and find the stable settings.
+    """Identify plants and open loops of a stage, and find the crossovers that are stable.
 
     Raises InputError for a stage without a joint.
     """
@@ -149,9 +153,9 @@ def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 def open_loops(
     stage: Stage, place: float, seed: int, settings: tuple[float, ...]
 ) -> tuple[tuple[RigLog, ...], tuple[MeasuredLoop, ...]]:
-    """Return logs of one excitation at several settings of the controller, with their loops.
+    """Return logs of one excitation at several crossovers of the controller, and their loops.
 
-    `settings` are crossovers over the stage's.
+    `settings` are these crossovers over the stage's own.
     """
     factors = np.array(settings)
     recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))
@@ -165,7 +169,7 @@ def open_loops(
 
 
 def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
-    """Return the open loop of a log, tuned to a crossover [Hz]; no lines if it was unstable."""
+    """Return the open loop of a log, tuned to a crossover [Hz]; without response if unstable."""
     if log.failure:
         none = np.zeros(0)
         return MeasuredLoop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
@@ -174,7 +178,7 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
 
 
 def locked_plant(logs: list[RigLog]) -> Plant:
-    """Return the plant with the joint locked: averaged response and its lowest mass line."""
+    """Return the plant with its joint locked, from logs: averaged response and lowest mass line."""
     averaged = estimate_plant(logs)
     lines = mass_lines(averaged)
     nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
@@ -183,7 +187,10 @@ def locked_plant(logs: list[RigLog]) -> Plant:
 
 
 def free_plant(logs: list[RigLog]) -> Plant:
-    """Return the plant with the joint free: its first mode has the largest ratio to a mass line."""
+    """Return the plant with its joint free, from logs: response, first mode and mass line.
+
+    The first mode is where acceleration over force is largest, below the parasitic mode.
+    """
     averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)
@@ -194,9 +201,9 @@ def free_plant(logs: list[RigLog]) -> Plant:
 
 
 def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
-    """Return the median [kg] of force over acceleration between two frequencies [Hz].
+    """Return the median of force over acceleration [kg] between two frequencies [Hz].
 
-    Its range is that of the middle half.
+    The range of the estimate is that of the middle half of the values.
     """
     inside = (response.frequency >= low) & (response.frequency <= high)
     method = f"force over acceleration, {low:.3g} to {high:.3g} Hz"
@@ -208,7 +215,10 @@ def mass_between(response: FrequencyResponse, low: float, high: float) -> Estima
 
 
 def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
-    """Return the masses [kg] that the mass line shows for the motor constants of `RATIOS`."""
+    """Return the masses [kg] that a stage's response shows for the motor constants of `RATIOS`.
+
+    The response is measured at a place [m] on the rail.
+    """
     ratios = np.array(RATIOS)
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
     logs = [rig_log(recorded, row, "", None, stage, seed) for row in range(len(ratios))]
@@ -218,7 +228,10 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
 
 
 def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the crossovers [Hz] tried, and which of them brought the stage to its reference."""
+    """Return the crossovers [Hz] tried, and which of them brought the stage to its reference.
+
+    The stage is released beside its reference, at a place [m].
+    """
     factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
     off = RELEASED * stage.flat()["joint.stroke"] / WIDE
     task = replace(standing(place, WAIT / pace(stage)), displacement=off)

@@ -1,6 +1,6 @@
-"""A move at several crossovers, with the joint locked and free.
+"""A move at several crossovers, with the joint locked and free, which may end in hunting.
 
-Thesis, Fig. 24, 25; on the stage's rail and on repeated ones.
+Thesis, Fig. 24, 25; on the stage's rail and on further rails with other seeds.
 """
 
 from __future__ import annotations
@@ -39,11 +39,13 @@ CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Crossovers over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others friso's choice."""
 
 SHOWN = (2, 3, 6)
-"""Indices of the thesis's crossovers among them."""
+"""Indices of the thesis's crossovers among `CROSSOVERS`."""
 
 DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
-"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side on the thesis's rig
-(friso's choice)."""
+"""Distances from the reference at which the stage is released, over that of the move.
+
+They are 0.5 and 5 mm to either side on the thesis's rig (friso's choice).
+"""
 
 CASES = {"locked": True, "free": False}
 
@@ -58,10 +60,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Startable:
-    """A machine that comes to rest `after_move` and swings `after_release`.
+    """A machine that comes to rest `after_move`, but swings after a release, `after_release`.
 
-    After the move no peaks are counted; after the release it swings to the end. It has its crossover [Hz], the number
-    of its rail, and the displacement [m] of the release.
+    After the move no peaks are counted; after the release it swings to the end. It has its crossover [Hz], the index of
+    its rail, and the `displacement` [m] of the release.
     """
 
     after_move: Trace
@@ -75,11 +77,11 @@ class Startable:
 class HuntingResult:
     """Results of the hunting experiment.
 
-    `moves` are the outcomes of the moves by case (locked, free), arrays of shape (crossovers, rails), at `crossovers`
-    [Hz] on `rails` (seeds, the stage's own first). `started` are the outcomes of releases with the joint locked, shape
-    (displacements, crossovers, rails), by `displacements` [m]. `shown` are the numbers of the thesis's crossovers.
-    `rail` is the number of the rail that the logs and the `traces` (by case and number of the crossover) show: the
-    first one with counted peaks, locked, at the stage's own crossover, or else the stage's own. `startable` is a
+    `cases` are the outcomes of the moves, joint locked and free, arrays of shape (crossovers, rails). They are at
+    `crossovers` [Hz] on `rails` (seeds, the stage's own first). `started` are the outcomes of releases with the joint
+    locked, shape (displacements, crossovers, rails), by `displacements` [m]. `plotted` are the indices of the thesis's
+    crossovers. `rail` is the index of the rail of the logs and of the `traces`, by case and index of the crossover. It
+    is the first one with counted peaks, locked, at the stage's own crossover, or else the stage's own. `startable` is a
     machine that comes to rest after the move but hunts after a release, None if there is none.
     """
 
@@ -95,13 +97,13 @@ class HuntingResult:
     startable: Startable | None
 
     def shares(self, case: str) -> list[Share]:
-        """Return the fraction of rails on which peaks are counted, by crossover."""
+        """Return the fraction of rails on which peaks are counted in a case, for each crossover."""
         return [self.cases[case].share(row) for row in range(len(self.crossovers))]
 
     def limit(self, case: str, rail: int | None = None) -> float:
-        """Return the highest crossover [Hz] at which peaks are counted on a rail; NaN for none.
+        """Return the highest crossover [Hz] at which peaks are counted in a case; NaN for none.
 
-        `rail` None means any rail.
+        `rail` is the index of a rail; None means any rail.
         """
         counted = self.cases[case].counted if rail is None else self.cases[case].counted[:, [rail]]
         rows = np.flatnonzero(counted.any(axis=1))
@@ -109,7 +111,7 @@ class HuntingResult:
 
     @property
     def can_start(self) -> np.ndarray:
-        """Tell whether peaks are counted after the move or a release, joint locked.
+        """Return where peaks are counted after the move or a release, with the joint locked.
 
         Shape (crossovers, rails).
         """
@@ -119,7 +121,7 @@ class HuntingResult:
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """Run the move at all crossovers on all rails, and releases with the joint locked.
 
-    Raises InputError without a joint or a motion that moves the stage.
+    Raises InputError for a stage without joint, or a motion that does not move it.
     """
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
@@ -145,7 +147,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def machine_file(stage: Stage, rail: float) -> Stage:
-    """Return the stage file of a machine on a rail of another seed."""
+    """Return the stage with its rail drawn from another seed, `rail`, if it has a rail."""
     return stage if stage.rail is None else stage.replace({"rail.seed": rail})
 
 
@@ -157,10 +159,10 @@ def _moves_and_releases(
     seeds: np.ndarray,
     progress: Progress,
 ) -> tuple[dict[str, RailRuns], RailRuns]:
-    """Run the move of each case, and releases with the joint locked.
+    """Run the move in each case (locked, free), and releases with the joint locked.
 
-    Moves at crossovers [Hz] on all rails have the shape (crossovers, rails), releases (displacements, crossovers,
-    rails).
+    `frequencies` are crossovers [Hz], and `seeds` those of the rails. Moves have the shape (crossovers, rails),
+    releases (displacements, crossovers, rails).
     """
     stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)

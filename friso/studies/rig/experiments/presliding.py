@@ -1,7 +1,7 @@
-"""Stiffness and damping of the bearing's bristles by small motion before it slides, and loops up to break-away.
+"""Stiffness and damping of the bearing's bristles, from small motion before it slides.
 
-The loops tell friction laws apart. The joint is locked. The thesis has no such experiment, but the bristles decide
-whether a machine near the boundary of hunting hunts.
+Loops up to break-away tell friction laws apart. The joint is locked. The thesis has no such experiment, but the
+bristles decide whether a machine near the boundary of hunting hunts.
 """
 
 from __future__ import annotations
@@ -32,18 +32,24 @@ GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
 the longest sample time [s], for slower rigs."""
 
 LOOPS = np.linspace(0.2, 0.9, 8)
-"""Force amplitudes of loops over static friction. At the largest, some places along the rail break away."""
+"""Force amplitudes of loops over static friction.
+
+At the largest, some places along the rail break away.
+"""
 
 PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
-"""Periods of the crossover that a loop takes, number of loops, and samples of the log per period of the crossover (0.5
-s and 1 ms on the thesis's rig)."""
+"""Periods of the crossover that a loop takes, and number of loops.
+
+SAMPLES are those of the log per period of the crossover. On the thesis's rig a loop takes 0.5 s, with samples 1 ms
+apart.
+"""
 
 
 @dataclass(frozen=True)
 class Bristles:
     """Results of the presliding experiment: fits by place, logs of loops, and true bristles.
 
-    The true stiffness is in [N/m], the true damping in [N s/m].
+    The true `stiffness` is in [N/m], and the true `damping` in [N s/m].
     """
 
     by_place: tuple[Presliding, ...]
@@ -53,7 +59,7 @@ class Bristles:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Run a small multisine at each place, and loops at the middle one.
+    """Run a small multisine (sum of sines) at each place, and loops of force at the middle one.
 
     Raises InputError for a stage whose friction has no bristles.
     """
@@ -84,7 +90,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
-    """Return the log of one small excitation at a place [m]."""
+    """Return the log of a small multisine (sum of sines) at a place [m] on the rail."""
     kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST * pace(stage))))
     return rig_log(excite(stage, place, seed, kind=kind), 0, name, "presliding", stage, seed)
 

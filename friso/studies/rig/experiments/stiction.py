@@ -26,23 +26,25 @@ RAILS = 10
 """Number of rails, each drawn anew (friso's choice); the thesis has "multiple experiments"."""
 
 LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
-"""Timing of the experiment in periods of the crossover, and samples of the log per period. LOADS is the time in which
-the joint is loaded up to the friction force (2 s on the thesis's rig, at 0.63 mm/s). STANDS is the time for which the
-reference stands between velocities. Samples are 1 ms apart on the thesis's rig."""
+"""Timing of the experiment in periods of the crossover, and samples of the log per period.
+
+LOADS is the time in which the joint is loaded up to the friction force (2 s on the thesis's rig, at 0.63 mm/s). STANDS
+is the time for which the reference stands between velocities. Samples are 1 ms apart on the thesis's rig.
+"""
 
 SLIPS = 8
 """Number of times that the joint is loaded in each leg."""
 
 SPEEDS = (1, 2, -1, -2)
-"""Successive velocities as multiples of the slow one: forward and back (friso's choice)."""
+"""Successive velocities as multiples of the slow speed: forward and back (friso's choice)."""
 
 
 @dataclass(frozen=True)
 class Stiction:
     """Results of the stiction experiment.
 
-    Each log is evaluated with the joint's true stiffness. For each rail there are the least and greatest true static
-    friction [N] where the cart went, shape (rails, 2), and the slow velocity [m/s].
+    Each log is evaluated with the joint's true stiffness. For each rail, `true` has the least and greatest true static
+    friction [N] where the cart went, shape (rails, 2). `speed` [m/s] is the slow one.
     """
 
     by_rail: tuple[StickSlip, ...]
@@ -56,9 +58,9 @@ class Stiction:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Run slow motion there and back on several rails.
+    """Run slow motion to and fro on several rails, and evaluate the break-away forces.
 
-    Raises InputError for a stage without a joint, or static friction.
+    Raises InputError for a stage without a joint, or without static friction.
     """
     if "friction.static" not in stage.flat():
         actual = f"model = {stage.flat().get('friction.model', 'none')!r}"
@@ -76,18 +78,18 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def _note(flat: Mapping[str, Any]) -> str:
-    """Return a note on how the stage is set up."""
+    """Say to which stroke the limiters are set."""
     stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
     return f"the limiters are set to {stroke}, which is recorded beside the logs for friso identify"
 
 
 def slow_speed(stage: Stage) -> float:
-    """Return the speed [m/s] at which a sticking cart reaches friction in `LOADS` periods."""
+    """Return the speed [m/s] that loads a sticking cart up to friction in `LOADS` periods."""
     return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
 
 
 def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
-    """Return logs of slow legs to and fro, on rails of successive seeds.
+    """Return logs of slow motion to and fro, on `rails` rails of successive seeds.
 
     All start from the same place.
     """
@@ -106,13 +108,16 @@ def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]
 
 
 def _log(free: Stage, chunk: RecordedRuns, row: int, number: int, seed: int) -> RigLog:
-    """Return one rail's log, with the stage that has this rail."""
+    """Return one rail's log, with the stage that has this rail.
+
+    It is in `row` of a chunk of runs, and `number` is the rail's index.
+    """
     on_rail = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
     return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", on_rail, seed + number)
 
 
 def true_range(log: RigLog) -> tuple[float, float]:
-    """Return the least and greatest static friction [N] where the cart went."""
+    """Return the least and greatest static friction [N] where the cart of a log went."""
     flat = anywhere(log.stage.flat())
     along = level_under_conditions(flat, "static") * friction_factors(flat, log.true["cart_position"])[0]
     return float(along.min()), float(along.max())

@@ -23,16 +23,18 @@ STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 """Size of a step in strokes (0.3 mm on the thesis's rig, Sec. 4.2.2), and directions of the steps (friso's choice)."""
 
 STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
-"""Periods of the crossover for which each step stands (2 s on the thesis's rig), at least and at most; time constants
-of the integrator against the joint for which it stands, if these take longer; samples of the log per period (1 ms). All
-are friso's choice."""
+"""Timing of the steps, all friso's choice.
+
+Each step stands for STANDS (2 s on the thesis's rig) to LONGEST periods of the crossover. In between, it stands for
+SETTLED time constants of the integrator against the joint. SAMPLES are those of the log per period (1 ms apart).
+"""
 
 
 @dataclass(frozen=True)
 class Stiffness:
     """Results of the stiffness experiment: the fit to the log, and the true stiffness [N/m].
 
-    The ratio of true to assumed motor constant is the factor by which the drive's newtons are too small.
+    `motor_constant_ratio`, of true to assumed motor constant, is the factor by which the drive's newtons are too small.
     """
 
     steps: StepStiffness
@@ -41,7 +43,7 @@ class Stiffness:
 
     @property
     def apparent(self) -> float:
-        """Return the stiffness [N/m] that the log shows, because the drive's newtons are too small."""
+        """Return the stiffness [N/m] that a log shows whose newtons are too small."""
         return self.true / self.motor_constant_ratio
 
 
@@ -58,7 +60,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def steps(stage: Stage, seed: int) -> RigLog:
-    """Return the log of the steps."""
+    """Return the log of position steps of a stage with its joint free and its cart fixed."""
     free, period = freed(stage), 1 / pace(stage)
     step = STEP * stage.flat()["joint.stroke"]
     stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
@@ -72,8 +74,8 @@ def steps(stage: Stage, seed: int) -> RigLog:
 def pulling_time(stage: Stage) -> float:
     """Return the time constant [s] with which the integrator moves the joint to the reference.
 
-    The cart is fixed. The time is proportional gain plus the joint's stiffness, over the integral gain; 0 without an
-    integrator.
+    The cart is fixed. The time is the proportional gain plus the joint's stiffness, over the integral gain; 0 without
+    an integrator.
     """
     flat = stage.flat()
     proportional, integral = slow_gains(flat)
@@ -81,7 +83,7 @@ def pulling_time(stage: Stage) -> float:
 
 
 def _notes(stage: Stage) -> tuple[str, ...]:
-    """Return notes on the result."""
+    """Return notes on how the stage was set up, and on what its stiffness includes."""
     notes = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
     if stage.flat().get("cable.stiffness", 0.0) > 0:
         notes.append("the cables move with the stage: their stiffness is included in the result")
