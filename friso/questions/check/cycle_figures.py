@@ -15,10 +15,9 @@ if TYPE_CHECKING:
     from friso.hunting import Cycle, Hunting
 
 _VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle
-_LEAST_RETURN = 1e-4  # least swing past the target that is drawn, relative to the swing before
 _STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed
 _BASIN = "#fbe3d6"  # a pale vermillion, the colour of hunting
-_APART = 0.01  # smallest difference of cart and stage that is drawn, relative to the amplitude
+_LEAST_DRAWN = 0.01  # smallest return, and difference of cart and stage, that is drawn, relative to the swing
 _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
 
@@ -56,7 +55,7 @@ def _return_map(item: ShownCase) -> list[Panel]:
     if hunting.returns is None:
         return []
     distances, returns = hunting.returns.distances[0], hunting.returns.returns[0]
-    beyond = returns > _LEAST_RETURN * distances
+    beyond = returns > _LEAST_DRAWN * distances
     if not beyond.any():
         return []
     largest = max([cycle.amplitude for cycle in hunting.cycles], default=np.max(distances[beyond]) / _VIEW)
@@ -153,7 +152,7 @@ def _positions(cycle: Cycle, label: str, colour: str) -> list[Series]:
     lines = [_line(cycle, "time", "position", label, colour)]
     if "cart_position" in cycle.trace:
         cart = _line(cycle, "time", "cart_position", "cart", INK)
-        if np.max(np.abs(cart.y - lines[0].y)) > _APART * cycle.amplitude:
+        if np.max(np.abs(cart.y - lines[0].y)) > _LEAST_DRAWN * cycle.amplitude:
             lines.append(cart)
     return lines
 
