@@ -129,6 +129,17 @@ def read_stage(
     return stage
 
 
+def mention_sampling(stage: Stage) -> None:
+    """Log that runs are of the machine as built, and at which sample time [s]."""
+    from friso.shown.drawing.prefixes import with_unit
+    from friso.virtual_rig.task import SAMPLE_TIME
+
+    stated = stage.flat().get("drive.sample_time")
+    every = with_unit(stated or SAMPLE_TIME, "s")
+    usual = "" if stated else ", as drive.sample_time is not given"
+    LOGGER.warning(f"runs are of the machine as built: its controller samples every {every}{usual}")
+
+
 def mention_unstable_loop(stage: Stage) -> None:
     """Log that the loop of a stage is unstable, if it is.
 

@@ -27,6 +27,7 @@ from friso.interface.inputs import (
     MetricName,
     StageLike,
     Tolerance,
+    mention_sampling,
     mention_unstable_loop,
     read_stage,
     tolerance_of,
@@ -53,7 +54,7 @@ from friso.questions.map.study import (
 from friso.stage import Stage
 from friso.stage.rig import AS_BUILT
 from friso.studies.axes import AxisValues
-from friso.studies.built_runs import of_runs_alone
+from friso.studies.built_runs import of_runs_alone, runs_as_built
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.settings import StudySettings
@@ -306,6 +307,8 @@ def sweep(
         else:
             metric = ("verdict" if confirm else "sketch") if metric in (None, "sketch") else metric
             chosen = read_stage(stage, set, leaves_out=() if of_runs_alone([metric]) else AS_BUILT)
+            if runs_as_built(chosen, [metric]):
+                mention_sampling(chosen)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)
