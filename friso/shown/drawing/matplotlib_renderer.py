@@ -32,6 +32,7 @@ from matplotlib.ticker import (
 from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
+from friso.quantities import quoted
 from friso.shown.drawing.drawable import drawable, word_ticks
 from friso.shown.drawing.figure import GREY, INK, Band, Figure, Markers, Panel, Series
 from friso.shown.drawing.images import FORMATS
@@ -127,7 +128,9 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
         canvas = pyplot.figure(figsize=size, layout="constrained")
         places = [canvas.add_subplot(prepared.rows, prepared.columns, k + 1) for k in range(len(prepared.panels))]
     else:
-        places = [axes] if isinstance(axes, Axes) else [*axes]
+        places = [axes] if isinstance(axes, Axes | str) else [*axes]
+    if not all(isinstance(place, Axes) for place in places):
+        raise InputError("axes", quoted(axes), "axes of matplotlib (.report writes files)", '.report("folder")')
     if len(places) != len(prepared.panels):
         expected = f"{len(prepared.panels)}, one per panel of the figure"
         raise InputError("axes", f"{len(places)} axes", expected, f"plt.subplots({len(prepared.panels)})[1]")
