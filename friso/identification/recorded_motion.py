@@ -160,7 +160,7 @@ def _check(times: np.ndarray, values: np.ndarray) -> None:
 
 
 def _in_keys(example: str) -> str:
-    """Rewrite command-line options of a log, in an example, as keys of [motion]."""
+    """Rewrite an example of the options --map, --unit and --dt as keys of the table [motion]."""
     words = shlex.split(example)
     keys = []
     for option, value in zip(words[::2], words[1::2], strict=False):

@@ -78,9 +78,10 @@ def _partial(log: Log) -> bool:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Claim logs that mostly move at constant speeds, enough for a curve of friction over speed.
+    """Return why logs move at constant speeds, or None.
 
-    At the slowest speeds a body may stick and slip, so logs in one direction are claimed too.
+    They must mostly do so, at enough speeds for a curve of friction over speed. At the slowest speeds a body may stick
+    and slip, so logs in one direction count too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

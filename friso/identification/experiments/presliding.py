@@ -81,10 +81,10 @@ class Presliding:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A fit of mass and bristles at one low-pass.
+    """A fit of mass and bristles to signals below one low-pass frequency.
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is how much of
-    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` tells whether the
+    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` is true if the
     search for the bending stopped at a limit, and `left` is the unexplained fraction of the friction. Low-passed
     signals over time [s], shape (n,), are the position of the body on the bearing, its force and the model's.
     """
@@ -105,7 +105,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Estimate bristles from motion that is small against their break-away deflection.
 
     The log has position and force; if it has gaps, the longest stretch is used. A joint must be held, or its deflection
-    measured.
+    measured. `between` describes what lies between the measured force and the bearing.
 
     The intervals include: the change with a lower low-pass and with the best-fitting delay (used if no delay is known);
     the uncertainty of the viscous friction subtracted from the damping; and the residual, because the model leaves out
@@ -177,16 +177,17 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
-    """Fit again with the mass from the first fit and, if `late`, with the best-fitting delay."""
+    """Fit twice, the second time with the mass and, if `late`, the delay that the first gives."""
     fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Fit the force at a low-pass by least squares, and search the bending, which is nonlinear.
+    """Fit the force below a low-pass frequency [Hz] by least squares.
 
-    `mass` [kg] is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
+    The bending of the bristles, which is nonlinear, is searched. `mass` [kg] is the assumed moving mass; if `late`, the
+    effect of a slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)

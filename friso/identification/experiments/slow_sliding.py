@@ -116,7 +116,7 @@ class _Equation:
         return self.model(p) - self.friction
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the residual, shape (m, 5)."""
+        """Return the derivatives of the residual by the fitted numbers, shape (m, 5)."""
         settings = ExperimentSettings.current()
         residuals_here = self.model(p)
         return np.stack(
@@ -191,7 +191,10 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Return the scales of the fitted numbers: the mean force [N], and the RMS velocity [m/s]."""
+    """Return the scales of the five fitted numbers, in the order of `_Equation`.
+
+    Forces have the mean size of the force [N], the Stribeck velocity the RMS velocity [m/s].
+    """
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 

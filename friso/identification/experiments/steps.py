@@ -242,9 +242,9 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log without a moving reference whose position rests in several places.
+    """Return why a log holds position steps against a joint, or None.
 
-    The force at these places rises with the position.
+    Its position rests in several places, where the force rises with the position, and no reference moves.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

@@ -145,7 +145,10 @@ def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the low-passed force on the cart [N], and the relative error of its scale."""
+    """Return the low-passed force on the cart [N], and the relative error of its scale.
+
+    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`.
+    """
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises if missing
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)

@@ -83,7 +83,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
     """Return each role's channel at even instants in the unit of the role.
 
     A channel that was proposed by its name and is not `needed` is left out, with a warning, if it lacks instants or a
-    unit. For other channels raises LogError.
+    unit. Any other channel without them raises LogError.
     """
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}

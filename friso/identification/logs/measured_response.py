@@ -140,9 +140,9 @@ def response_unit(text: str) -> tuple[float, str, str]:
 
 
 def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
-    """Check a response, and return it without its line at 0 Hz.
+    """Check a response; return it as a response of position, without lines at 0 Hz or below.
 
-    Raises LogError for too few or falling frequencies and NaN.
+    Raises LogError for too few or falling frequencies, for NaN, and for a force over a motion.
     """
     positive = measured.frequency > 0
     if not positive.all():

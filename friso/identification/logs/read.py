@@ -73,7 +73,7 @@ def read_table(path: Path | str) -> ChannelTable:
 def is_frequency_response(path: Path | str) -> bool:
     """Tell whether a file has a frequency response instead of signals over time.
 
-    Raises LogError as `file_format`.
+    Raises LogError for a file that cannot be opened or has no known format.
     """
     path = Path(path)
     return FORMATS[file_format(path)].holds_response(path)

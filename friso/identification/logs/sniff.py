@@ -38,7 +38,8 @@ class TextLayout:
     """Layout of a text.
 
     `first` is the number of lines before the numbers, and `above` has these lines; `names` and `units` are per column.
-    With `exact` every delimiter ends a cell, so that several spaces are empty cells.
+    `certain` is true if the text shows its decimal sign. With `exact` every delimiter ends a cell, so that several
+    spaces are empty cells.
     """
 
     encoding: str

@@ -128,7 +128,7 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
 
 
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
-    """Check that no row lacks cells in complete columns.
+    """Check that no row lacks its last cells while later rows have them.
 
     Raises LogError.
     """

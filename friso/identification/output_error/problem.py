@@ -212,7 +212,10 @@ class Problem:
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
-        """Compute the force [N] of a continuous-time controller from states at the samples."""
+        """Compute the force [N] of the controller from the states at the samples, shape (runs, n).
+
+        It is the stage's own controller in a closed loop, otherwise the guiding controller.
+        """
         count = runs.states.shape[1]
         if not self.closed:
             return self._holding_force(runs)

@@ -136,11 +136,9 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """Return the range [SI] of an undetermined parameter that is plausible for any bearing.
+    """Return the range [SI] that any bearing may have of a parameter that is not determined.
 
-    `owner` is the parameter's name.
-
-    The fitted value is no bound, because it compensates for what the model lacks.
+    `owner` is the parameter's name. The fitted value is no bound, because it compensates for what the model lacks.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]

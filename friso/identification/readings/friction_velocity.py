@@ -40,8 +40,8 @@ class Direction:
 class FrictionVelocity:
     """Friction over speed, in both directions, with its data.
 
-    `forward` and `backward` include the constant force in their Coulomb friction; `both` excludes it, and `bias` [N] is
-    the constant force on the body as in the stage file.
+    The `directions` "forward" and "backward" include the constant force in their Coulomb friction; `both` excludes it,
+    and `bias` [N] is the constant force on the body as in the stage file.
 
     Per steady stretch, shape (n,), there are the velocity [m/s], and the mean force [N] without inertia with the
     half-width of its 95 % interval [N]. `unsteady`, shape (m,), has the velocities of unsteady stretches; `places` [m]
@@ -174,7 +174,10 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Return the standard deviation [N] common to all friction levels, from half-widths [N]."""
+    """Return the standard deviation [N] that all forces share, from their half-widths [N].
+
+    They share it because they were read over the same places.
+    """
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
 

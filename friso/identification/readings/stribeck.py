@@ -51,8 +51,8 @@ class FittedStribeck:
 class Forces:
     """Friction [N] against the motion at speeds [m/s], shape (n,), to which a curve is fitted.
 
-    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. Both
-    directions may share one curve and a constant force.
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. `both` is
+    true if both directions share one curve and a constant force.
     """
 
     speeds: np.ndarray
@@ -166,9 +166,10 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """Return the margin of each grid point to the cost limit of the possible region.
+        """Return how far the cost of each grid point is below the limit of the possible region.
 
-        `left` is the number of degrees of freedom.
+        The result has the shape (velocities, exponents), and is negative outside. `left` is the number of degrees of
+        freedom.
         """
         least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
         least = np.where(np.isfinite(least), least, 0.0)

@@ -65,8 +65,8 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 
 
 def _longest(response: FrequencyResponse, share: float) -> float:
-    """Return the sample time [s] of a response.
+    """Return the sample time [s] of a response or, if not known, the longest that is plausible.
 
-    If it is not known, return a fraction of the period of the highest frequency.
+    That is the fraction `share` of the period of the highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

@@ -24,9 +24,9 @@ F/v (Gelb, Vander Velde 1968, table E.2: random-input describing function of the
 class Departure:
     """Where a response leaves its linear model at low frequency.
 
-    Below `frequency` the response differs from the model; `excess` (lines,) is |G/G_model| at `lines` [Hz]. `differ`
-    tells whether realisations differ there by more than noise (chance below 1 %), None with a single realisation;
-    `ratio` is their scatter relative to the noise.
+    Below `frequency` the response differs from the model; `excess` (lines,) is |G/G_model| at the frequencies `lines`
+    [Hz]. `differ` tells whether realisations differ there by more than noise (chance below 1 %), None with a single
+    realisation; `ratio` is their scatter relative to the noise.
     """
 
     frequency: Estimate

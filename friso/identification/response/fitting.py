@@ -90,9 +90,9 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:
-    """Return the deviation of each line for weighting, at least a thousandth of the response.
+    """Return the deviation by which each spectral line is weighted.
 
-    No model is more accurate than a thousandth.
+    It is at least a thousandth of the response, because no model is more accurate.
     """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 

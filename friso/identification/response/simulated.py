@@ -1,4 +1,4 @@
-"""Simulate a mass with Coulomb friction and a spring under recorded forces, to explain a departure."""
+"""Simulate a mass with Coulomb friction and a spring, to explain a response off its mass line."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the fraction of the departure from the mass line that a simulation leaves."""
+    """Return the fraction of a response's distance from its mass line that a simulation leaves."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

@@ -47,7 +47,10 @@ class TwoMass:
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
-        """Return the complex response of the driven mass, or of the other mass, at frequencies [Hz]."""
+        """Return the complex response of one mass, shape (n,), at frequencies [Hz], shape (n,).
+
+        It is the driven mass if `collocated`, otherwise the other mass.
+        """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
 
@@ -78,7 +81,8 @@ def fit_two_mass(
 ) -> TwoMass:
     """Fit the two-mass model to force-to-position responses in a `band` [Hz] (default: all).
 
-    The responses must have the same lines. Raises InputError if they do not, or for too few lines.
+    `collocated` is the response of the driven mass, `noncollocated` that of the other mass, if measured. Both must have
+    the same lines. Raises InputError if they do not, or for too few lines.
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
     if band is not None:
@@ -274,7 +278,7 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
 
 
 def _root(parameters: np.ndarray, zero: bool) -> complex:
-    """Return the pole or the collocated zero with the largest imaginary part [rad/s]."""
+    """Return the pole, or the zero of the driven mass, with the largest imaginary part [rad/s]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     first = np.array([driven, parameters[DRAG] + damping, stiffness])
     second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
