@@ -103,11 +103,14 @@ class Configuration:
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
     def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
-        """Return the configuration moved along a rate by a factor."""
+        """Return the configuration plus `factor` times the displacements in `rate`."""
         return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
 
     def state(self, offsets: np.ndarray) -> np.ndarray:
-        """Return the state of all nodes, shape (leaves, nodes, 6)."""
+        """Return the state of all nodes, shape (leaves, nodes, 6).
+
+        `offsets` [m] are the places of the leaves along z.
+        """
         x, z, turn = self.stage
         leaves, inner, _ = self.inner.shape
         state = np.zeros((leaves, inner + 2, COORDINATES))
@@ -136,11 +139,11 @@ class Condensed:
     def of(
         cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
     ) -> Condensed:
-        """Condense the stiffness of the leaves and the forces on their nodes.
+        """Condense the stiffness of the leaves and the forces on their nodes onto the stage.
 
-        Of each node, the coordinates which, which + 2 and which + 4 are used. `ends` (leaves, 3, 3) tells how the leaf
-        ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the forces
-        exert there.
+        Of each node, the coordinates `which`, `which` + 2 and `which` + 4 are used. `ends` (leaves, 3, 3) tells how the
+        leaf ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the
+        forces exert there.
         """
         matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)

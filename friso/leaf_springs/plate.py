@@ -68,7 +68,7 @@ class Curl:
         return moment - sum(terms)
 
     def curvature(self, s: Any, length: Any) -> Any:
-        """Return f'' at s for the moment m."""
+        """Return the curvature f'' along the leaf at s, under the moment m."""
         moment = s if self.odd else 1.0
         return moment + self.poisson**2 / (1 - self.poisson**2) * self.shape(s, length)
 

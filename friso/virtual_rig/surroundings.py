@@ -19,7 +19,7 @@ from friso.virtual_rig.task import MoveTask
 
 
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
-    """Return the tables of runs, over place and over time.
+    """Return friction, motor constant, floor and injected force of runs as tables.
 
     Stages are given as flat keys to SI numbers or arrays of shape (runs,). `seeds` are the seeds of the runs' noise;
     rails have the machines' "rail.seed". If the runs do not differ, all share one table.

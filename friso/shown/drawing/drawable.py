@@ -88,7 +88,7 @@ def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
 
 
 def line_key(figure: Figure) -> list[Series]:
-    """Return the labelled lines of panels, each once, for the common legend."""
+    """Return the labelled lines of panels with maps or clouds, each once, for the common legend."""
     lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
     return list({(line.label, line.colour, line.dash): line for line in lines}.values())
 
