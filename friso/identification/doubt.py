@@ -88,11 +88,12 @@ class ValueCase(RecordCase):
 
 @dataclass(frozen=True)
 class TriedForces:
-    """Forces [N] of an effect that the model leaves out, each of shape (n,) and of size 1.
+    """Forces, shape (n,) each, by which an effect outside the model may explain a residual.
 
-    `units` are the small sizes at which the forces are simulated. `label` distinguishes hypotheses of one effect, such
-    as the width of a play [m]. `searched` is the number of hypotheses from which this one is chosen, because the best
-    of many explains more by chance. Unless the largest fitted size is at least `least`, another effect is the cause.
+    A force [N] is given for an effect of size 1, and simulated at the small size in `units`. `label` distinguishes
+    hypotheses of one effect, such as the width of a play [m]. `searched` is the number of hypotheses from which this
+    one is chosen, because the best of many explains more by chance. Unless the largest fitted size is at least `least`,
+    another effect is the cause.
     """
 
     forces: Sequence[np.ndarray]
@@ -141,7 +142,7 @@ class FitCase(FittedCase):
     def may_name(self, doubt: str) -> bool:
         """Tell whether a doubt may name its effect as the cause of the residual.
 
-        It may if its effect explains most of the residual, or if no effect does and no other cause has been named.
+        A doubt may if its effect explains most of the residual, or if no effect does and no other cause has been named.
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 

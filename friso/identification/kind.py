@@ -169,7 +169,7 @@ class ExperimentKind(Generic[Result]):
     failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return the roles that a log with the given mapped roles needs."""
+        """Return the roles that a log needs, such as position, given the roles that it has."""
         choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 

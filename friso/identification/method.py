@@ -181,9 +181,9 @@ def predict(
 ) -> Prediction:
     """Predict another log of the machine by the first experiment that can.
 
-    Kinds that use results of other kinds come first. The prediction uses the one experiment's stage, not the
-    combination, so that errors are from one record to another. The controller is taken from `base`, or from the log's
-    own set-up. Raises InputError if no experiment can.
+    Kinds that use results of other kinds come first. The prediction uses the stage of this one experiment, not of all
+    combined, so that errors are from one record to another. The controller is taken from `base`, or from the log's own
+    [setup]. Raises InputError if no experiment can.
     """
     prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}

@@ -167,9 +167,10 @@ def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Esti
 
 
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
-    """Return an estimate whose interval also covers another one, and `further`, times `scale`.
+    """Return an estimate whose interval also covers another one, times `scale`.
 
-    Both estimates count, because it is undecided which is right; `further` is in the unit of `other`.
+    Both estimates count, because it is undecided which is right. The other's interval is extended by `further`, in its
+    unit.
     """
     if not (estimate.determined and other.determined):
         return estimate

@@ -158,7 +158,7 @@ def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """A simulation of another log of one axis, with the estimates of the first.
+    """A simulation of a log, with the estimates from another log of the same axis.
 
     Fields are the samples used, the simulated record and its errors; `apart` is the largest deviation among machines
     drawn from the estimates, relative to the position (infinite if one diverges).
@@ -173,8 +173,8 @@ class SimulatedLog:
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
     """Simulate another log of an identified axis with its estimates.
 
-    `set_up` has the flat keys of the stage as set up for this log, of which the controller and changed keys are used.
-    Raises InputError where the machine's own loop is not known.
+    `set_up` has the stage for this log as flat keys, of which the controller and changed keys are used. Raises
+    InputError where the machine's own loop is not known.
     """
     if moves.loop is None:
         expected = "the machine's own controller, with which another record can be simulated"

@@ -30,7 +30,7 @@ RecordedSamples = tuple[np.ndarray, np.ndarray]
 class Recorded(Motion):
     """A reference from a channel of a file: CSV, MAT, TwinCAT, or any other log.
 
-    Its first value counts as 0; its last value is held to the end.
+    The first value counts as 0; the last value is held to the end.
     """
 
     kind: Literal["recorded"]

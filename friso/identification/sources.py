@@ -240,7 +240,7 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
     """Read a log without known instants as if sampled every second; None if impossible.
 
-    Its motion then shows the kind of experiment.
+    The motion of this log then shows the kind of experiment.
     """
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)

@@ -166,7 +166,10 @@ def end_motions(offsets: np.ndarray) -> np.ndarray:
 
 
 def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return the effect on the stage of a matrix that acts at all stage ends."""
+    """Sum a matrix (6, 6) at the stage end of each leaf to the matrix that acts on the stage.
+
+    `ends` (leaves, 6, 6) tells how the stage ends follow the stage.
+    """
     return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
 
 

@@ -212,9 +212,9 @@ def _inside(h: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Return the compliance in bending of elements.
+    """Return the bending compliance of elements relative to a plain beam, shape (elements,).
 
-    It is weighted by the square of the moment in parallel motion.
+    Its mean over an element is weighted by the square of the moment in parallel motion.
     """
     s = _inside(h, middles)
     return (
@@ -225,7 +225,7 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Return the compliance in torsion of elements.
+    """Return the torsional compliance of elements relative to a plain beam, shape (elements,).
 
     It follows `plate.free_twist`, so that a constant torque meets the stiffness of the plate. It is tilted so that the
     torque of a force across the deflected leaf, s^3, meets it too.

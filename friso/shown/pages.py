@@ -128,9 +128,9 @@ def _escaped_text(value: Any) -> Any:
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """Return the figure as a data address in quotation marks.
+    """Return a figure as a data address in quotation marks.
 
-    It is printed, and seen in browsers without scripts.
+    The image is printed, and seen in browsers without scripts.
     """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
@@ -160,7 +160,7 @@ TENTHS = 10
 def _shortened(path: re.Match[str]) -> str:
     """Write an SVG path in less text.
 
-    Places are relative to the ones before, to a tenth of a point.
+    Each place is relative to the one before, to a tenth of a point.
     """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])

@@ -53,7 +53,7 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
 
 
 def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
-    """Measure recorded runs of stages with the flat keys `flat`: swing, settling, outcome and more.
+    """Measure recorded runs of stages, given as flat keys: swing, settling, outcome and more.
 
     The force is the drive's command.
     """

@@ -65,7 +65,7 @@ def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dic
 
 
 def with_complete_drive(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys with missing keys of the drive added, at their ideal values."""
+    """Return a stage, given as flat keys, with missing keys of the drive at their ideal values."""
     flat = anywhere(flat)
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": flat.get("drive.integrator_reset", False) * 1.0}

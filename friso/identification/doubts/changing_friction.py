@@ -119,9 +119,10 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
-    """Widen the fit's deviations by the changes of both forces and by the shifts they cause.
+    """Widen the fit's deviations by a drift of friction and constant force, and what it shifts.
 
-    Both forces are friction and the constant force.
+    Coulomb friction and the constant force get the largest drift from the mean, all numbers the shift that the drift
+    causes.
     """
     further = np.abs(changes.moved)
     for i, name in enumerate(fit.fitted):

@@ -1,4 +1,7 @@
-"""Doubt: the delay between force and motion drifts along the record, by two clocks or a filling buffer."""
+"""Doubt: the delay between force and motion drifts along the record.
+
+Two clocks or a filling buffer cause such a drift.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Doubt: the inertia of a mass is smaller than the residual."""
+"""Doubt: the force that accelerates a mass is smaller than what the fit leaves unexplained."""
 
 from __future__ import annotations
 

@@ -80,8 +80,8 @@ def _partial(log: Log) -> bool:
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Return why logs move at constant speeds, or None.
 
-    They must mostly do so, at enough speeds for a curve of friction over speed. At the slowest speeds a body may stick
-    and slip, so logs in one direction count too.
+    Most of their motion must be at constant speeds, enough for a curve of friction over speed. At the slowest speeds a
+    body may stick and slip, so logs in one direction count too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

@@ -36,8 +36,8 @@ OUT_OF_STEP = (
 def _claims(course: Course) -> str | None:
     """Return why a log holds moves, or None.
 
-    Its reference moves, or it has no periodic excitation and no series of constant speeds or force ramps. Without a
-    reference its position rests in between, or its force has few frequencies, as with sines.
+    The reference of such a log moves, or it has no periodic excitation and no series of constant speeds or force ramps.
+    Without a reference its position rests in between, or its force has few frequencies, as with sines.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:

@@ -139,7 +139,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
-    """Return a record low-passed and thinned to the needs of a cut-off [Hz] of the force."""
+    """Low-pass and thin a record, as a fit of the force below `cutoff` [Hz] needs it."""
     settings = ExperimentSettings.current()
     return record.seen(
         settings.low_pass_of_the_motion * cutoff,
@@ -148,7 +148,7 @@ def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
 
 
 def _nothing(why: str) -> Presliding:
-    """Return a result without estimates, with the reason."""
+    """Return a result without estimates, for the reason `why`."""
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
     none = np.empty(0)
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
@@ -226,10 +226,10 @@ def _apart(columns: np.ndarray, number: int) -> float:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The equation of a record of small motion at a low-pass.
+    """The equation of motion for a record of small motion, below one low-pass frequency.
 
-    It has the position [m] of the body on the bearing, shape (n,), and, low-passed, the force [N] and the columns that
-    do not depend on the bristles, shape (m,) each.
+    `body` is the position [m] of the body on the bearing, shape (n,). Low-passed, shape (m,) each, there are the force
+    [N] in `target` and the columns that do not depend on the bristles.
     """
 
     low_pass: LowPass

@@ -82,12 +82,12 @@ class SlowSliding:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The equation of a record of slow sliding at a low-pass.
+    """The equation of friction for a record of slow sliding, below one low-pass frequency.
 
-    It has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s], shape (n,);
-    low-passed, shape (m,), the friction [N] without the viscous part, and its change per second of delay. `sizes` are
-    the scales of the fitted numbers: Coulomb friction, excess of static friction, Stribeck velocity, constant force,
-    initial force of the bristles.
+    The record has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
+    shape (n,). Low-passed, shape (m,), it has the friction [N] without the viscous part, and its change per second of
+    delay. `sizes` are the scales of the fitted numbers: Coulomb friction, excess of static friction, Stribeck velocity,
+    constant force, initial force of the bristles.
     """
 
     low_pass: LowPass
@@ -180,7 +180,7 @@ def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _nothing(why: str) -> SlowSliding:
-    """Return a result without estimates, with the reason."""
+    """Return a result without estimates, for the reason `why`."""
     none = np.empty(0)
     return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
 

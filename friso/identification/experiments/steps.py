@@ -244,7 +244,7 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
 def _claims(course: Course) -> str | None:
     """Return why a log holds position steps against a joint, or None.
 
-    Its position rests in several places, where the force rises with the position, and no reference moves.
+    The position of such a log rests in several places, where the force rises with the position. No reference moves.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

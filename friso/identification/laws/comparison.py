@@ -52,8 +52,8 @@ class LawPrediction:
 class LawComparison:
     """The friction laws, ranked by their prediction of logs, the best first.
 
-    `logs` are the names of the logs used, `left_out` names the others, each with the reason, and `parts` counts the
-    predicted parts. `unseen` tells whether fits started from the stage before any log.
+    `logs` are the names of the logs used, `left_out` has the reason for each other log by its name, and `parts` counts
+    the predicted parts. `unseen` tells whether fits started from the stage before any log.
     """
 
     predictions: tuple[LawPrediction, ...]

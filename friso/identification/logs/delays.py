@@ -12,7 +12,7 @@ from friso.identification.logs.settings import LogSettings
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
     """Report the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
 
-    Both are sampled every `period` [s].
+    Both signals are sampled every `period` [s]; the longest of `parts` is used.
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
@@ -56,7 +56,7 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     """Return the lag [samples] with which causes explain an effect best; NaN if it is unclear.
 
-    It is unclear if a lag of 0 explains almost as much.
+    The lag is unclear if a lag of 0 explains almost as much.
     """
     settings = LogSettings.current()
     shares = _explained(effect, causes)

@@ -220,9 +220,9 @@ def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> 
 
 
 def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
-    """Return the candidates for a role, with the quality of their fit, the best first.
+    """Return the channels that may have a role, each rated by how well it fits, the best first.
 
-    Candidates must have as many samples as most channels.
+    Channels with as many samples as most channels come first.
     """
     used = {id(channel) for channel in taken}
     usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
@@ -249,7 +249,7 @@ def _is_of_another(role: str, unit: str) -> bool:
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Choose the measured channel among channels that move alike, with the reason.
+    """Choose the measured channel among channels that move alike, and say why.
 
     The measured channel is the only one whose name says so, or the noisiest. The channel is None if that is unclear.
     """

@@ -267,12 +267,12 @@ def is_clock(channel: Channel) -> bool:
 
 
 def of_no_signal(name: str) -> bool:
-    """Tell whether a name says that a channel is an error, a limit, a counter or the like."""
+    """Tell whether a name says that a channel is no signal: an error, a limit, a counter."""
     return bool({*words(name)} & _NOT_MEASURED)
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Return the only candidate whose name is exactly the role or its word, or None."""
+    """Return the only candidate whose name is exactly the role, or the word for it; else None."""
     if len(matches) < 2:
         return None
     for alone in (

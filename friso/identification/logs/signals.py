@@ -155,7 +155,7 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
     """Tell whether a channel without a unit is taken as SI.
 
-    It is if the user assigned it, the format has no units, and it is no current or voltage in place of a force.
+    This is so if the user assigned it, the format has no units, and it is no current or voltage in place of a force.
     """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)
@@ -249,7 +249,7 @@ def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading,
 def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
     """Return how many seconds the unit of the time channel has.
 
-    Raises LogError for none.
+    Raises LogError for a channel without a unit of time.
     """
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.by_user and reading.bare:

@@ -103,7 +103,7 @@ class _WithoutDosEnd:
         self._file = file
 
     def read(self, size: int = -1) -> str:
-        """Read so many characters, without the mark."""
+        """Read `size` characters (-1: all), without the mark."""
         return self._file.read(size).replace(DOS_END, "")
 
     def __iter__(self) -> Iterator[str]:

@@ -122,10 +122,10 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """Put a track on even instants.
+    """Give a channel even instants in each segment.
 
-    Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the track is
-    interpolated, with a note.
+    Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the values are
+    interpolated, with a warning.
     """
     settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)

@@ -1,4 +1,4 @@
-"""Sample machines at random from what a record leaves open, as rows of fitted numbers."""
+"""Sample machines at random from what a record leaves open."""
 
 from __future__ import annotations
 

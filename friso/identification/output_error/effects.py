@@ -57,11 +57,11 @@ def explained_by_forces(
 def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray, searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit a residual, shape (n,), by changes of the fitted numbers and by additional effects.
+    """Explain a residual, shape (n,), by changes of the fitted numbers and additional effects.
 
-    Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number without effect, or
-    with infinite derivatives, does not move. Returns None if the effects explain no more than the best of `searched`
-    random ones.
+    `slopes` are the derivatives by the numbers, (n, numbers); `effects` and the weights `counted` have the shape (n,).
+    A number without effect, or with infinite derivatives, does not move. Returns None if the effects explain no more
+    than the best of `searched` random ones.
     """
     settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])

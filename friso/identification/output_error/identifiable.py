@@ -37,7 +37,7 @@ class IdentifiableFit:
     """A fit, and the names of the parameters that the record determines.
 
     `profiles` has, by name, the profiles of parameters that not every motion shows, and `shown` the names of the
-    determined ones. `refuted` are parameters that something else in the record contradicts, with the reason.
+    determined ones. `refuted` has the reason for each parameter that something else in the record contradicts.
     """
 
     fit: OutputErrorFit

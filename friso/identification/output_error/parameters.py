@@ -86,8 +86,9 @@ def fit_parameters(
 
     `levels` has first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s] is
     the highest in the log, and `travel` [m] its range: bristles bend no further, and the Stribeck velocity is no higher
-    unless bearings typically have higher ones. If the log does not go `both_ways`, a constant force and an asymmetry
-    cannot be distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
+    unless bearings typically have higher ones. If the log does not go `both_ways`, a constant force and friction that
+    differs by direction cannot be separated from friction, and are left out. Raises InputError for a friction law that
+    cannot be fitted.
     """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]

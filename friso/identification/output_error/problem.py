@@ -135,7 +135,7 @@ class Problem:
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         """Return target minus simulated force [N], shape (runs, n).
 
-        It is 0 at samples that do not count, and infinite for runs that failed.
+        Residuals are 0 at samples that do not count, and infinite for runs that failed.
         """
         residuals = np.empty((len(inner), len(self.target)))
         for numbers, record in self.simulated(inner):
@@ -214,7 +214,7 @@ class Problem:
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
         """Compute the force [N] of the controller from the states at the samples, shape (runs, n).
 
-        It is the stage's own controller in a closed loop, otherwise the guiding controller.
+        The stage's own controller counts in a closed loop, otherwise the guiding controller.
         """
         count = runs.states.shape[1]
         if not self.closed:

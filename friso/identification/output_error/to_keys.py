@@ -66,7 +66,7 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Turn deviations of logarithms into deviations of values that reach the interval's upper end.
+    """Widen deviations to the upper end of intervals that are symmetric in the logarithm.
 
     An interval of half a value each way in the logarithm reaches 0.65 of the value above and 0.4 below.
     """

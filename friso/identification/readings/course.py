@@ -19,10 +19,10 @@ from friso.identification.response.period import find_periods
 
 @dataclass(frozen=True)
 class Repetition:
-    """Periodic repetition in a log.
+    """How a signal in a log repeats.
 
-    A period has `samples` samples, about so many `harmonics`, and turns of direction; the position rests for a fraction
-    of the time.
+    A period has `samples` samples, effectively `harmonics` harmonics, and `turns` changes of direction. The position
+    rests for the fraction `rests` of the time.
     """
 
     samples: int

@@ -107,7 +107,8 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
 def _better(plain: float, least: float, more: int, left: int) -> bool:
     """Tell whether a curve fits significantly better than a line with fewer parameters (F-test).
 
-    It has `more` parameters than the line, and leaves `left` degrees of freedom.
+    `plain` and `least` are the sums of squares of line and curve. The curve has `more` parameters than the line, and
+    leaves `left` degrees of freedom.
     """
     settings = ReadingSettings.current()
     return least < plain and (

@@ -105,9 +105,9 @@ class Drag:
 def friction_from_departure(
     response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
 ) -> Drag:
-    """Return the friction that explains how a response leaves its mass line.
+    """Return the friction that explains how a response leaves its mass line at low frequency.
 
-    The departure is fitted between `limits` [Hz]. `velocities` are those of the realisations, each of shape (n,),
+    The response is fitted between `limits` [Hz]. `velocities` are those of the realisations, each of shape (n,),
     [output unit/s]. Under a broad-band excitation Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation
     of the velocity: 1/(m s^2 + d s + k) is fitted. The interval covers the interval of the damping and the difference
     between two distributions of the velocity, normal and sinusoidal (gain 4/pi over the amplitude). It is valid while

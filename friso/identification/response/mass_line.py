@@ -111,9 +111,9 @@ def _widest(
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
-    """Return the widest band with acceptable chi-square and phase, between two lines.
+    """Return the widest band with acceptable chi-square and phase, as its first and last line.
 
-    All pairs of ends are tried.
+    All pairs of ends from line `start` to line `stop` are tried. Returns None if no band is wide enough.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
@@ -201,7 +201,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
 
 
 def _independent(residual: np.ndarray) -> float:
-    """Return the effective number of independent lines, from the correlation of neighbours.
+    """Return the effective number of independent residuals, from the correlation of neighbours.
 
     The sum of correlations comes out too small in a short band. A first-order autoregression does not, and is used if
     it gives fewer.

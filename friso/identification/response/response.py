@@ -72,7 +72,7 @@ class FrequencyResponse:
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
-        """Convert the response to python-control's data, over rad/s, with a line at 0 Hz if any."""
+        """Convert the response to data for python-control, over frequencies in rad/s."""
         from control import FrequencyResponseData
 
         omega = 2 * np.pi * self.frequency

@@ -1,4 +1,4 @@
-"""Simulate a mass with Coulomb friction and a spring, to explain a response off its mass line."""
+"""Simulate a mass with Coulomb friction and a spring, to explain a measured response."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def slid(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Simulate a mass [kg] on a spring [N/m] with Coulomb friction [N] under forces [N].
 
-    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (lanes, n). Time stepping
+    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (runs, n). Time stepping
     treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the
     step. The error is of first order in the sample time.
     """

@@ -290,5 +290,5 @@ def _root(parameters: np.ndarray, zero: bool) -> complex:
 
 
 def _si(unit: str) -> str:
-    """Shorten units to kg, N/m and the like where input is in newtons and output in metres."""
+    """Shorten a unit to kg, N s/m and so on where input is in newtons and output in metres."""
     return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

@@ -65,7 +65,7 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
 def colour_prefix(field: Coloured) -> tuple[float, str]:
     """Return factor and prefixed unit for the numbers of a map or cloud.
 
-    Its limits decide, or else all its numbers.
+    The limits of the colours decide, or without limits all numbers.
     """
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
