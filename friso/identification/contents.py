@@ -122,7 +122,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
     """Read a log as identification would; return it, its kind of experiment, and the reason.
 
-    Raises LogError, and GapsError for missing information.
+    Raises LogError for an unusable log, and GapsError for missing information.
     """
     if mapping.experiment is not None:
         return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"

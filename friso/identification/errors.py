@@ -66,7 +66,7 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
     """Return the force that guides a stage along the logged position, over the logged force.
 
-    It is the relative force that the model leaves unexplained; `held` contains it. Errors of the motion are NaN.
+    The model leaves this force unexplained; `held` contains it. Errors of the motion are NaN.
     """
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)

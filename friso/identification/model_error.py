@@ -120,7 +120,10 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Extend intervals to the values of a faulty log corrected for each cause; returned by key."""
+    """Return estimates by key, extended to the values of the log corrected for each cause.
+
+    The result is empty unless the record has a fault.
+    """
     if not case.quality.spoilt:
         return {}
     answers = {}
@@ -134,7 +137,7 @@ def _with_causes(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _imitated_by_causes(case: KeyCase) -> dict[str, str]:
-    """Return, by key, why a faulty record does not show what the inverse model lacks."""
+    """Return, by key, why a faulty record does not show keys outside the inverse model."""
     others = case.determined.keys() - inverse_sources(case.flat).keys() if case.quality.spoilt else ()
     return dict.fromkeys(others, SPOILT)
 
@@ -158,9 +161,10 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """Return a quantity of the inverse model corrected for a cause, and its remaining error.
+    """Return a quantity of `model`, corrected for a cause, and its remaining error.
 
-    The correction may be incomplete, at most by as much again.
+    `inverse` is the model before the correction. The correction may be incomplete; as much again may be missing at
+    most.
     """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))

@@ -1,12 +1,14 @@
 """Model the leaves of a mechanism as geometrically exact beams of exudyn.
 
 The module computes forces, stiffness and mass of the nodes. Only this module knows exudyn. A leaf is a chain of equal
-two-node elements of constant strain. Three corrections keep few elements exact. An element misses bending because its
-moment is taken as constant; that bending is added to its shear flexibility (residual bending flexibility: h^2/(12 E I)
-per force). Its bent middle carries mass beyond the straight line between its nodes; that mass is added to its rotary
-inertia (rho A h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the
-stiffness of the plate in parallel motion, under a constant torque, and under the torque that a force across the
-deflected leaf adds.
+two-node elements of constant strain. Three corrections keep few elements exact:
+
+- An element misses bending because its moment is taken as constant. That bending is added to its shear flexibility
+  (residual bending flexibility: h^2/(12 E I) per force).
+- The bent middle of an element carries mass beyond the straight line between its nodes. That mass is added to its
+  rotary inertia (rho A h^2/6).
+- What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness of the
+  plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf adds.
 """
 
 from __future__ import annotations
@@ -160,7 +162,7 @@ class Condensed:
 
 
 def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
-    """Add the nodes and elements of a leaf."""
+    """Add the nodes and elements of a leaf to a system of exudyn."""
     h = float(mechanism.length) / elements
     middles = h * (np.arange(elements // 2) + 0.5)
     half = [

@@ -137,8 +137,8 @@ class Evaluation:
 def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
     """Return how far a mode's resonance rises above the line of the stage's mass, as a factor.
 
-    `actuator` and `sensor` are the mode's motions [1/sqrt(kg)] there. Their product, the residue, over 1/m of the mass
-    is divided by 2 zeta.
+    `actuator` and `sensor` are the mode's motions [1/sqrt(kg)] at these places. Their product, the residue, is divided
+    by 1/m of the stage's mass m and by 2 zeta.
     """
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 

@@ -54,7 +54,7 @@ class Report:
 
     `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
     is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
-    templates of the package `templates`. Pages that are `scripted` load plotly even without figures of their own kind.
+    templates of the package `templates`. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str
@@ -181,7 +181,7 @@ def _shortened(path: re.Match[str]) -> str:
 
 
 def _tenths(number: int, apart: bool) -> str:
-    """Write a number of tenths.
+    """Write a number of tenths as a decimal number, without a leading 0.
 
     `apart` separates it from a number before it, unless its sign does.
     """

@@ -60,7 +60,10 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return by how much friction may exceed static friction [N] at or below speeds [m/s], (n,)."""
+    """Return by how much friction may exceed static friction [N] at or below speeds [m/s], (n,).
+
+    Viscous friction may rise faster than the Stribeck curve falls.
+    """
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)

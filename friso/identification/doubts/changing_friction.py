@@ -121,8 +121,8 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
     """Widen the fit's deviations by a drift of friction and constant force, and what it shifts.
 
-    Coulomb friction and the constant force get the largest drift from the mean, all numbers the shift that the drift
-    causes.
+    Coulomb friction and the constant force get their largest drift from the mean. All fitted numbers get the shift that
+    the drift causes.
     """
     further = np.abs(changes.moved)
     for i, name in enumerate(fit.fitted):

@@ -55,7 +55,7 @@ def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.
     """Return signals to which a linear controller is fitted, and what its gains may depend on.
 
     The signals, shape (rows, 9), are the error, its derivatives and integral, the motion of the reference and its
-    direction, and last the force [N]. All passed through one filter. Rows with a force at its limits are left out; the
+    direction, and last the force [N]. All of them pass one filter. Rows with a force at its limits are left out; the
     second result numbers the stretches between them, shape (rows,). The third has time, speed and place by name, shape
     (rows,) each.
     """

@@ -46,7 +46,7 @@ def _stated_exponent(prior: Prior) -> float | None:
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of friction and constant force, in the order of the covariance.
+    """Return estimates of friction and constant force, in the order of their covariance.
 
     An exponent that the stage states is not included.
     """

@@ -252,9 +252,9 @@ class _Equation:
 
 
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
-    """Set up the equation of a record.
+    """Set up the equation of motion of a record, with signals low-passed at `cutoff` [Hz].
 
-    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position: the part
+    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position. The part
     of this effect that `between` does not describe is among the fixed columns.
     """
     time, low_pass = record.time, LowPass(record.time, cutoff)
@@ -276,7 +276,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _at_most(total: Estimate) -> Estimate:
-    """Bound the damping of the bristles by the `total` with unknown viscous friction."""
+    """Return the damping of the bristles as at most `total`, which includes viscous friction."""
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"

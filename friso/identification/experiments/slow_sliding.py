@@ -202,7 +202,7 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
-    """Set up the equation of a record at a low-pass [Hz]."""
+    """Set up the equation of friction of a record, with signals low-passed at `cutoff` [Hz]."""
     settings = ExperimentSettings.current()
     seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])

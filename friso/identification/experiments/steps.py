@@ -102,7 +102,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
     """Find stretches of a segment at a constant position that are long enough to average.
 
-    The reference decides, or the position without one.
+    The reference decides what is constant; without a reference, the position does.
     """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
@@ -172,10 +172,10 @@ def _drifting(values: np.ndarray) -> tuple[Mean, float]:
 
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
-    """Fit the differences of force over those of deflection by a line through the origin.
+    """Estimate the stiffness by a line through the origin: changes of force over deflection.
 
-    Neighbouring differences share a window, so the largest of three variances counts: for independent differences
-    (drifting force), for differences of independent windows (noise), and by the noise within windows.
+    Neighbouring changes share a window, so the largest of three variances counts: for independent changes (drifting
+    force), for changes of independent windows (noise), and by the noise within windows.
     """
     method = METHOD + words
     count = int(chosen.sum())

@@ -160,7 +160,7 @@ def _pull(
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
-    """Estimate the joint's stiffness from this log."""
+    """Estimate the joint's stiffness from force and deflection while the cart sticks (`loads`)."""
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"

@@ -59,7 +59,7 @@ def is_response(names: Iterable[str]) -> bool:
 def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     """Build a frequency response from the columns of a table.
 
-    Raises LogError.
+    Raises LogError for columns that are missing, doubled, or of different lengths.
     """
     by_kind: dict[str, list[Channel]] = {}
     for channel in table.channels:

@@ -68,7 +68,8 @@ class Reading:
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
     """Return the table with the user's units, and with times derived from time columns.
 
-    Times are derived if the format has no `times` of its own. Raises LogError.
+    Times are derived if the format has no `times` of its own. Raises LogError for an unknown unit, or for a channel
+    that the table lacks.
     """
     if not mapping.units:
         return table
@@ -232,7 +233,7 @@ def _span(values: np.ndarray) -> str:
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
     """Return the instants of a channel [s]; None if nothing states them.
 
-    Raises LogError.
+    Raises LogError for a time column in an unusable unit.
     """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
@@ -312,10 +313,7 @@ def _offers(table: ChannelTable) -> str:
 
 
 def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
-    """Check that every scale is for a role that has a channel.
-
-    Raises LogError.
-    """
+    """Check that every scale is for a role that has a channel; raise LogError if one is not."""
     for role in mapping.scales:
         if role not in chosen:
             raise LogError("scale", f"a scale for {role}, which has no channel", "a channel for it",

@@ -109,7 +109,7 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return the samples that are numbers, and how many samples between them are not.
 
-    Raises LogError.
+    Raises LogError if fewer than half of the samples are numbers.
     """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:

@@ -45,7 +45,7 @@ class ExplainedResidual:
 def explained_by_forces(
     fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit additional forces to the residual of a fit, and let the fitted numbers change along.
+    """Fit additional forces to the residual of a fit, while its parameters may change, too.
 
     Each force [N], shape (n,), has size 1; it is simulated at its size in `units`, small enough to be linear. Returns
     None if the forces explain no more than the best of `searched` random ones.

@@ -78,7 +78,7 @@ class Problem:
 
     @property
     def kernel(self) -> Kernel:
-        """The compiled equations of the stage."""
+        """Return the compiled equations of the stage."""
         return kernel(self.form)
 
     def noise_left(self, noise: float) -> float:

@@ -88,7 +88,8 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 def believed_between(prior: Prior, log: Log) -> Between:
     """Return the elements between force and bearing, from other experiments or the stage file.
 
-    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError.
+    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError for a [setup] that the
+    stage does not take.
     """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")

@@ -208,7 +208,7 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 
 def _no_repeatability(reason: str) -> Estimate:
-    """Return an undetermined repeatability, with the reason."""
+    """Return an undetermined repeatability; the estimate states the `reason`."""
     return Estimate.unknown(
         "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
@@ -248,7 +248,7 @@ def _from_to(values: list[float]) -> str:
 
 
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
-    """Tell whether the force is the friction of the rail, with a sentence."""
+    """Tell whether the force is the friction of the rail, and say in a sentence why or why not."""
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:

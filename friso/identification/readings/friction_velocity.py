@@ -183,7 +183,7 @@ def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
 
 
 def _nothing(reason: str) -> Direction:
-    """Return undetermined friction for a direction, with the reason."""
+    """Return undetermined friction for a direction; each estimate states the `reason`."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
     coulomb, viscous, static, velocity, exponent = unknown

@@ -1,9 +1,9 @@
 """Fit a Stribeck curve to friction at constant speeds, with profile intervals.
 
-At a given Stribeck velocity and exponent the curve is linear in all other parameters: least squares are computed over a
-grid of both, and an interval contains every value that explains the forces within chance, for any exponent (profile
-likelihood). A linearised interval at the best fit is much too narrow, because another exponent with another velocity
-may fit as well.
+At a given Stribeck velocity and exponent the curve is linear in all other parameters. Least squares are therefore
+computed over a grid of both, and an interval contains every value that explains the forces within chance, for any
+exponent (profile likelihood). A linearised interval at the best fit is much too narrow, because another exponent with
+another velocity may fit as well.
 """
 
 from __future__ import annotations

@@ -17,11 +17,11 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class Explanation:
-    """A simulation of friction, and its residual against the departure of a measured response.
+    """A simulation of friction, compared with a measured response that leaves its mass line.
 
     `responses` are simulated responses by the factor on the recorded input. `left` is the fraction of the departure
-    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain: 0
-    means a full explanation, 1 none.
+    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain. It is
+    0 for a full explanation and 1 for none.
     """
 
     responses: Mapping[float, FrequencyResponse]

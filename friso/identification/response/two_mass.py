@@ -31,9 +31,9 @@ DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
 class TwoMass:
     """A driven mass, a joint and another mass, as fitted to a response.
 
-    The unit of masses is input per acceleration. `fit` has the parameters at the module's indices; `signs` of the two
-    outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping, viscous friction, delay,
-    antiresonance and resonance.
+    The unit of masses is input per acceleration. `fit` has the parameters, in the order of the constants of this
+    module. `signs` of the two outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping,
+    viscous friction, delay, antiresonance and resonance.
     """
 
     signs: tuple[float, float]
@@ -148,9 +148,9 @@ def _sign(response: np.ndarray) -> float:
 
 
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
-    """Check that a model is near the response, shape (outputs, lines), somewhere.
+    """Check that a model follows a response, shape (outputs, lines), at least roughly.
 
-    Raises InputError if it is not.
+    Raises InputError if it misses the magnitude by too large a factor on average.
     """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
     if off > ResponseSettings.current().misfit_of_no_model:
@@ -160,7 +160,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
-    """Return a start from the first antiresonance and resonance of a rational fit.
+    """Return a start of the fit from the first antiresonance and resonance of a rational fit.
 
     The total mass is 1. Returns [] without both.
     """
@@ -243,7 +243,7 @@ def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
-    """Yield warnings for the user of the model."""
+    """Yield a sentence for each output whose sign was reversed, and for a poor fit."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:

@@ -142,7 +142,7 @@ def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
 
 
 def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
-    """Return factor and unit with prefix."""
+    """Return the factor and the prefixed unit that suit the values of an axis."""
     return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
 
 
