@@ -313,7 +313,10 @@ def _offers(table: ChannelTable) -> str:
 
 
 def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
-    """Check that every scale is for a role that has a channel; raise LogError if one is not."""
+    """Check that every scale is for a role that has a channel.
+
+    Raises LogError for a scale without one.
+    """
     for role in mapping.scales:
         if role not in chosen:
             raise LogError("scale", f"a scale for {role}, which has no channel", "a channel for it",

@@ -179,9 +179,9 @@ def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
 
 
 def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
-    """Check that every quotation mark in a heading is closed; raise LogError if one is not.
+    """Check that every quotation mark in a heading is closed.
 
-    Otherwise all cells after it would be read as one.
+    Raises LogError for an open one, because all cells after it would be read as one.
     """
     number, heading = next(((n, line) for n, line in reversed([*enumerate(above, 1)]) if line.strip()), (0, ""))
     with suppress(csv.Error):

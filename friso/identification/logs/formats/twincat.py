@@ -119,10 +119,10 @@ def _channels(
 
 
 def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
-    """Check that no row lacks cells in the middle; raise LogError if one does.
+    """Check that no row lacks cells in the middle.
 
     Cells of a group that has ended may be missing together with their delimiters. The cells behind them have then moved
-    to the left, and the clock of another group jumps.
+    to the left, and the clock of another group jumps. Raises LogError for such a row.
     """
     ends = np.array(sorted({time.size for time in times} - {0}))
     for time in times:
