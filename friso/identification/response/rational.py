@@ -91,7 +91,8 @@ def _better(larger: Row, smaller: Row) -> bool:
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
     """Return the complex responses, (linear, lines), whose weighted sum is the model's response.
 
-    There is one of the rigid body, one of each mode, and a constant; the linear parameters are their weights.
+    There is one for the rigid body, if the model has one, one for each mode, and 1 for the constant, if it has one. The
+    linear parameters are the weights.
     """
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
