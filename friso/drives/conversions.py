@@ -105,8 +105,8 @@ def conversions(
 ) -> tuple[Conversion, ...]:
     """Return every gain of a stage in SI and in the units that drives use.
 
-    `flat` holds the stage by flat keys. Units that need an unknown travel or motor constant are left out. Raises
-    InputError for gains too large or too small to convert, and for answers that contradict the stage.
+    `flat` holds the stage as flat keys such as controller.kp. Units that need an unknown travel or motor constant are
+    left out. Raises InputError for gains too large or too small to convert, and for answers that contradict the stage.
     """
     turn = Turn.of(flat, answers, per_ampere)
     try:

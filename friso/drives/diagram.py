@@ -25,7 +25,7 @@ class Canvas:
     def __init__(self, flat: Mapping[str, Any]) -> None:
         """Start the drawing with the reference, the first sum and the fed-back position.
 
-        `flat` is the stage by flat keys; it tells which filters and limits to draw.
+        `flat` is the stage as flat keys; its keys tell which filters and limits to draw.
         """
         self.paths = {flat[f"{place}.path"] for place in row_keys(flat, FILTERS_KEY)}
         self.limited = FORCE_LIMIT in flat

@@ -17,7 +17,7 @@ from friso.quantities import quoted
 from friso.registry import Registry
 
 FlatStage = Mapping[str, Any]
-"""A stage as flat keys."""
+"""A stage as flat keys such as controller.kp, with SI values."""
 
 Beside = Callable[[str], str | None]
 """Function that returns the text of another file.

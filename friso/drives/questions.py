@@ -93,10 +93,10 @@ class UserAnswers:
 
 
 def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[OpenQuestion, ...]:
-    """List what no drive knows about its machine and the user has not said yet.
+    """List questions about the machine that no parameter file answers and the user has not.
 
-    They are moving mass and friction, and a move to try unless the file gives one (`moved`). Raises InputError for an
-    unknown friction law.
+    They ask for moving mass and friction, and for a move to try unless the file gives one (`moved`). Raises InputError
+    for an unknown friction law.
     """
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():

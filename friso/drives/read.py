@@ -25,7 +25,7 @@ from friso.stage.files import text_of
 class StageOfAxis:
     """A stage read from a parameter file, with where it came from.
 
-    It holds the file's path and kind, the name of the axis, and sentences on what the stage leaves out.
+    Fields are the file's path and kind, the name of the axis, and sentences on what the stage leaves out.
     """
 
     stage: Stage

@@ -15,7 +15,7 @@ from friso.identification.settings import IdentificationSettings
 from friso.intervals import COVERAGE
 
 Correlated = tuple[Sequence[Estimate], np.ndarray]
-"""Determined estimates of one experiment, with their correlation matrix, shape (estimates, estimates)."""
+"""Estimates of one experiment that have a value, and their correlation matrix, shape (estimates, estimates)."""
 
 
 def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
@@ -49,11 +49,11 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the keys of groups of estimates, and the correlations of their combined values.
+    """Return the keys of all groups of estimates, and the correlations of their combined values.
 
-    `estimates` come from all experiments; the correlations have the shape (keys, keys). A combined value is a weighted
-    mean of independent experiments, so the covariance is the sum of A_i C_i A_i, with weights A_i (diagonal) and the
-    covariance C_i within experiment i.
+    `estimates` come from all experiments. A group holds the estimates of one experiment that have a value, and their
+    correlations. The result has the shape (keys, keys). A combined value is a weighted mean of independent experiments.
+    So the covariance is the sum of A_i C_i A_i, with weights A_i (diagonal) and the covariance C_i within experiment i.
     """
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
@@ -72,7 +72,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
 
 
 def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """List the determined estimates, which have an interval to weight them by."""
+    """List the estimates that have a value; by their intervals they can be weighted."""
     return [estimate for estimate in estimates if estimate.determined]
 
 
@@ -111,7 +111,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 
 
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
-    """Return the mean of values, shape (n,), that scatter by more than their variances.
+    """Return the mean, with its deviation, of values (n,) that scatter beyond their variances.
 
     A common variance is added, just large enough to explain the scatter (Paule, Mandel 1982, doi:10.6028/jres.087.022).
     The degrees of freedom count effectively equal weights, because an uncertain value says little about the scatter.
@@ -127,9 +127,9 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
 
 def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """Return the common range of estimates without a value, or else the range of all.
+    """Combine estimates without a value: the common range, or else a range that spans all.
 
-    Also tells whether there is a common range.
+    The second result is true if there is a common range.
     """
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)

@@ -25,10 +25,10 @@ from friso.identification.sources import log_with_signals, unnamed
 
 @dataclass(frozen=True)
 class ChannelContent:
-    """A channel of a file.
+    """A channel of a log file, with the role, such as position, that friso proposes for it.
 
-    Its `values`, shape (n,), are in its `unit` ("" for none), at the instants `time` [s], shape (n,), or None. `role`
-    ("" for none) has a reason.
+    `values`, shape (n,), are in the `unit` ("" for none). `time`, shape (n,), has their instants [s], or is None.
+    `role` is "" if none is proposed; `reason` says why a role is proposed, or how many channels compete for it.
     """
 
     name: str
@@ -40,7 +40,7 @@ class ChannelContent:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Return the least and the greatest number; None without any."""
+        """Return the least and the greatest finite value; None if there is none."""
         finite = self.values[np.isfinite(self.values)]
         return (float(finite.min()), float(finite.max())) if finite.size else None
 
@@ -51,7 +51,7 @@ class ChannelContent:
 
     @property
     def sample_rate(self) -> float | None:
-        """Return the usual sampling rate [Hz]; None without increasing instants."""
+        """Return the usual sampling rate [Hz]; None if the instants are not known or never increase."""
         steps = np.diff(self.time) if self.time is not None else np.empty(0)
         steps = steps[steps > 0]
         return 1 / usual_step(steps) if steps.size else None
@@ -92,9 +92,10 @@ class LogContent:
 
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
-    """Read the contents of a file, mapped by options or by a stored mapping.
+    """Describe the contents of a log file, before anything is identified.
 
-    A mapping is stored beside the file or in `folder`. Raises LogError for a file that cannot be read.
+    The `options`, or a mapping stored beside the file or in `folder`, say which channel is what. Raises LogError for a
+    file that cannot be read.
     """
     name = file_format(path)
     title = FORMATS[name].title
@@ -119,9 +120,9 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
-    """Return the log as for identification, its kind of experiment, and the reason.
+    """Read a log as identification would; return it, its kind of experiment, and the reason.
 
-    Raises LogError, and GapsError for missing information.
+    Raises LogError for an unusable log, and GapsError for missing information.
     """
     if mapping.experiment is not None:
         return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"
@@ -129,7 +130,7 @@ def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
 
 
 def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelContent:
-    """Describe a channel with its instants and its role."""
+    """Describe a channel, with its instants and the role that the proposal gives it."""
     role, reason = "", ""
     for choice in proposal.chosen.values():
         if choice.channel is channel:
@@ -144,7 +145,7 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
 
 
 def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:
-    """Return the sampling instants of a channel [s]; None if neither file nor mapping has any."""
+    """Return the instants of a channel's samples [s]; None if neither file nor mapping has any."""
     clock = proposal.chosen.get("time")
     try:
         return instants(AssignedRole("", channel, "", False), clock, reading, Notes())

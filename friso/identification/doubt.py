@@ -38,25 +38,30 @@ if TYPE_CHECKING:
     from friso.identification.quality import Quality
 
 IMITATED = "what the model lacks would pass for it"
-"""Reason given where bristles are not reported because the model does not describe the record to its noise."""
+"""Reason for not reporting bristles: effects that the model lacks may look like them."""
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.
 
-- record: a `RecordCase`, of any log of moves, before the fit; - fault: a `RecordCase`, where a mass with friction does
-  not describe the log: faults of the log; - cause: a `RecordCase`, at that time: effects that would explain the
-  residual; - otherwise: a `RecordCase`, where no such effect explains it; - value: a `ValueCase`, the plausibility of
-  the inverse model's values; - fit: a `FitCase`, each in turn, with the fit as changed by earlier doubts; - curve: a
-  `KeyCase`, whether fitted parameters can be trusted; - key: a `KeyCase`, each in turn, with the estimates as changed
-  by earlier doubts; - response: a `Bench`, the analysis of a frequency response; - stage: the identified stage with all
-  estimates; laws: the compared friction laws with that stage."""
+- record: a `RecordCase`, of any log of moves, before the fit;
+- fault: a `RecordCase`, where a mass with friction does not describe the log: faults of the log;
+- cause: a `RecordCase`, at that time: effects that would explain the residual;
+- otherwise: a `RecordCase`, where no such effect explains it;
+- value: a `ValueCase`, the plausibility of the inverse model's values;
+- fit: a `FitCase`, each in turn, with the fit as changed by earlier doubts;
+- curve: a `KeyCase`, whether fitted parameters can be trusted;
+- key: a `KeyCase`, each in turn, with the estimates as changed by earlier doubts;
+- response: a `Bench`, the analysis of a frequency response;
+- stage: the identified stage with all estimates;
+- laws: the compared friction laws with that stage.
+"""
 
 
 @dataclass(frozen=True)
 class RecordCase:
-    """A log of moves with its inverse model.
+    """A log of moves with its inverse model, a least-squares fit of mass, friction and offset.
 
-    `cart_share` is the fraction of the mass that moves with a measured cart.
+    `cart_share` is the fraction of the mass that moves with a measured cart; 0 if none is measured.
     """
 
     log: Log
@@ -71,9 +76,10 @@ class RecordCase:
 
 @dataclass(frozen=True)
 class ValueCase(RecordCase):
-    """A log of moves with checks of its inverse model.
+    """A log of moves whose inverse model is checked for implausible values.
 
-    `lacks` tells that the model lacks something, `poor` that it does not describe the record.
+    `lacks` is true if the whole model leaves clearly more than noise, `poor` if the inverse model does not describe the
+    log.
     """
 
     lacks: bool = False
@@ -82,11 +88,12 @@ class ValueCase(RecordCase):
 
 @dataclass(frozen=True)
 class TriedForces:
-    """Forces [N] of an effect that the model leaves out, each of shape (n,) and of size 1.
+    """Forces, shape (n,) each, by which an effect outside the model may explain a residual.
 
-    `units` are the small sizes at which the forces are simulated. `label` distinguishes hypotheses of one effect, such
-    as the width of a play [m]. `searched` is the number of hypotheses from which this one is chosen, because the best
-    of many explains more by chance. Unless the largest fitted size is at least `least`, another effect is the cause.
+    A force [N] is given for an effect of size 1, and simulated at the small size in `units`. `label` distinguishes
+    hypotheses of one effect, such as the width of a play [m]. `searched` is the number of hypotheses from which this
+    one is chosen, because the best of many explains more by chance. Unless the largest fitted size is at least `least`,
+    another effect is the cause.
     """
 
     forces: Sequence[np.ndarray]
@@ -98,9 +105,10 @@ class TriedForces:
 
 @dataclass(frozen=True, kw_only=True)
 class FittedCase(RecordCase):
-    """A log of moves with the fit of the whole model.
+    """A log of moves with the whole model, a simulated stage that is fitted to it.
 
-    `flat` is the stage before the fit; `velocity` [m/s], shape (n,), is smoothed over the fitted part of the log.
+    `flat` has the stage before the fit, as keys such as friction.static with SI values. `velocity` [m/s], shape (n,),
+    is smoothed over the fitted part of the log.
     """
 
     flat: Mapping[str, Any]
@@ -112,7 +120,7 @@ class FittedCase(RecordCase):
 class FitCase(FittedCase):
     """A log of moves with its fit, and the quality of the fit.
 
-    `leading` is the effect that explains most of the residual, among all doubts that try forces.
+    `leading` is the effect whose forces explain most of the residual; None if no effect explains enough of it.
     """
 
     quality: Quality
@@ -132,9 +140,9 @@ class FitCase(FittedCase):
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
     def may_name(self, doubt: str) -> bool:
-        """Tell whether a doubt may name its cause.
+        """Tell whether a doubt may name its effect as the cause of the residual.
 
-        A doubt may if its effect leads, or if no effect leads and no other cause has been named.
+        A doubt may if its effect explains most of the residual, or if no effect does and no other cause has been named.
         """
         return not self.has_cause if self.leading is None else self.leading.doubt == doubt
 
@@ -144,13 +152,19 @@ class FitCase(FittedCase):
         return not (self.quality.failed or self.quality.rejected)
 
     def led_by(self, doubt: str) -> LeadingEffect | None:
-        """Return the leading effect if it belongs to the `doubt` and the fit describes the log."""
+        """Return the effect that explains most of the residual if it is the doubt's; else None.
+
+        The result is None, too, if the fit does not describe the log.
+        """
         return self.leading if self.describes and self.leading is not None and self.leading.doubt == doubt else None
 
     def explained(
         self, forces: Callable[[FittedCase], Iterable[TriedForces]]
     ) -> Iterator[tuple[TriedForces, ExplainedResidual]]:
-        """Yield those forces of an effect that explain a part of the fit's residual."""
+        """Yield each force of an effect that explains a part of the fit's residual, with that part.
+
+        Nothing is yielded if the fit does not describe the log.
+        """
         for tried in forces(self) if self.describes else ():
             explained = explained_by_forces(self.fit, tried.forces, tried.units)
             if explained is not None:
@@ -159,8 +173,8 @@ class FitCase(FittedCase):
     def reaching(self, moved: np.ndarray, further: Mapping[str, float] | None = None) -> OutputErrorFit:
         """Return the fit with intervals widened by the shift that an effect causes.
 
-        `moved` is the shift of the fitted numbers, shape (free,); `further` has larger reaches of some parameters, by
-        name.
+        `moved` is the shift of the fitted numbers, shape (free,), and counts several times. `further` is added for some
+        parameters, by name.
         """
         reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
         return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
@@ -168,7 +182,11 @@ class FitCase(FittedCase):
     def named(
         self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return the finding of the leading effect, which refuses bristles that it may imitate."""
+        """Return a finding that names an effect, widens intervals by its shift, refuses bristles.
+
+        `words` name the effect, and `size` is in `unit`. `further` widens the intervals of some parameters more, by
+        name.
+        """
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
         return RaisedDoubt(words, size, unit, fit=wider, refuses=refuses, explains=True)
@@ -176,7 +194,11 @@ class FitCase(FittedCase):
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return the finding of a leading effect that varies along the way, unnamed if small."""
+        """Return a finding on a force along the way; a small one only widens intervals, unnamed.
+
+        `words` name the effect; `size` is in the unit of the force. `further` widens the intervals of some parameters
+        more, by name.
+        """
         finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
         small = size < DoubtSettings.current().force_share_of_a_told_effect * float(np.std(force))
@@ -201,7 +223,10 @@ class LeadingEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class KeyCase(FitCase):
-    """A log of moves with its estimates by key of the stage file, and their `correlation`."""
+    """A log of moves with an estimate for each key of the stage file, and their `correlation`.
+
+    `acceleration` [m/s^2], shape (n,), is smooth; `unexplained` [N] is the RMS residual beyond noise.
+    """
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -214,7 +239,7 @@ class KeyCase(FitCase):
         return {estimate.name: estimate for estimate in self.estimates if estimate.determined}
 
     def with_answers(self, finding: RaisedDoubt) -> KeyCase:
-        """Return the case with estimates replaced by a finding's answers, or removed."""
+        """Return the case with estimates that a finding replaces, or leaves without a value."""
         answers = {**finding.answers, **refused(self.estimates, finding.refuses)}
         estimates = tuple(answers.get(estimate.name, estimate) for estimate in self.estimates)
         pairs = zip(self.estimates, estimates, strict=True)
@@ -224,13 +249,13 @@ class KeyCase(FitCase):
 
 @dataclass(frozen=True)
 class RaisedDoubt:
-    """A doubt with a finding: its cause in `words`, and its `size` with a `unit`.
+    """What a doubt found in a log: the cause in `words`, its `size` in `unit`, and what follows.
 
-    The `words` are "" if estimates state the cause. Consequences: intervals are extended to the values of the inverse
-    model `without` the effect, and to `reaches`, by quantity of the inverse model. `fit` and `inverse` have intervals
-    that allow for the effect. `answers` replace estimates of the same key. `refuses` maps keys that are not reported to
-    the reason. An effect that `spoils` the record can be mistaken for friction at low speed. If an effect `explains`
-    the residual, no other explanation is named. `doubt` is the doubt's name.
+    `words` are "" if estimates state the cause. Intervals are extended to the values of the inverse model `without` the
+    effect, and to `reaches`, by quantity of the inverse model. `fit` and `inverse` have intervals that allow for the
+    effect. `answers` replace estimates of the same key. `refuses` gives the reason for each key that is not reported.
+    An effect that `spoils` the record can be mistaken for friction at low speed. If an effect `explains` the residual,
+    no other explanation is named. `doubt` is the doubt's name.
     """
 
     words: str = ""
@@ -251,10 +276,10 @@ class RaisedDoubt:
 class Doubt:
     """An effect that may be in a log and is not in the model, named by its module (`DOUBTS`).
 
-    `find` yields findings from the case at its `moment`. The docs list what it `looks_at`, its `consequence`, and the
-    measurement by which it is `decided_by`. `after` names doubts that are examined earlier. `forces` returns forces
-    that the effect would add, to be fitted to the residual: the doubt whose forces explain most leads, and no other
-    doubt names a cause.
+    `find` yields findings from the case at its `moment`. The docs list what it `looks_at`, its `consequence`, and by
+    which measurement it is decided (`decided_by`). `after` names doubts that are examined earlier. `forces` returns
+    forces that the effect would add, to be fitted to the residual. The doubt whose forces explain most leads, and no
+    other doubt names a cause.
     """
 
     moment: Moment
@@ -271,21 +296,25 @@ DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
 
 
 def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:
-    """Yield the findings of all doubts of a moment, in their order."""
+    """Yield the findings of all doubts that are examined at a moment of the analysis, in order.
+
+    `case` is the argument of their `find` (`Moment`).
+    """
     for name in _at(moment):
         yield from _named(name, case)
 
 
 def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
-    """Return the causes in words of all doubts of a moment, in their order."""
+    """Return, in words, the causes that the doubts of a moment of the analysis find, in order."""
     return tuple(finding.words for finding in raised(moment, case))
 
 
 def causes(case: RecordCase) -> list[RaisedDoubt]:
-    """List possible faults of a log that a mass with friction does not describe.
+    """List findings on why a mass with friction does not describe a log.
 
-    Faults of the log come first; then effects with which the inverse model fits much better, sorted by fit, unless much
-    worse than the best; last, causes that count only without such effects. Returns [] if nothing explains the log.
+    Faults of the log come first; then effects with which the inverse model fits much better, best first, without those
+    that fit much worse than the best. Doubts of the moment "otherwise" are asked only if there is no such effect.
+    Returns [] if nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))
@@ -301,12 +330,12 @@ def causes(case: RecordCase) -> list[RaisedDoubt]:
 
 
 def way_of(velocity: np.ndarray) -> np.ndarray:
-    """Return the direction of a motion [m/s], (n,), from -1 to 1, gradual where it creeps."""
+    """Return the direction, -1 to 1, of a velocity [m/s], (n,); it turns gradually near 0."""
     return np.clip(velocity / (DoubtSettings.current().speed_share_of_creeping * np.abs(velocity).max()), -1.0, 1.0)
 
 
 def leading_effect(case: FittedCase) -> LeadingEffect | None:
-    """Return the effect whose forces explain most of a fit's residual; None if too little."""
+    """Return the effect whose forces explain most of a fit's residual; None if none suffices."""
     best: LeadingEffect | None = None
     searches = [(name, tries) for name in _at("fit") if (tries := DOUBTS[name].forces) is not None]
     every = [(name, tried) for name, tries in searches for tried in tries(case)]
@@ -347,9 +376,9 @@ def judged_keys(case: KeyCase) -> KeyCase:
 
 
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
-    """Turn determined estimates into undetermined ones, by key, where `reasons` refuse them.
+    """Return estimates without a value, by key, for those that `reasons` withhold.
 
-    The interval of a refused Coulomb friction becomes the interval of all dry friction at low speed.
+    `reasons` are by key. A withheld Coulomb friction keeps the interval of all dry friction at low speed.
     """
     ratio = OutputErrorSettings.current().highest_friction_ratio
     return {
@@ -366,10 +395,10 @@ def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[s
 
 
 def _at(moment: Moment) -> list[str]:
-    """Return the names of the doubts of a moment, in their order."""
+    """Return the names of the doubts that are examined at a moment of the analysis, in order."""
     return [name for name in in_order(DOUBTS) if DOUBTS[name].moment == moment]
 
 
 def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
-    """Yield the findings of one doubt, with its name."""
+    """Yield the findings of the doubt `name`, marked with its name."""
     return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))

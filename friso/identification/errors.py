@@ -18,7 +18,8 @@ class SimulationErrors:
     """Relative errors of a simulated record: norm of the difference over norm of the measured.
 
     Errors are given for position, velocity, acceleration and force; one filter gives velocity and acceleration of both
-    records. For a stage that follows the log's position, only the force has an error: its unexplained part.
+    records. For a stage that follows the log's position, only the force has an error, its unexplained part; the others
+    are NaN.
     """
 
     position: float
@@ -63,7 +64,10 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the error of a stage that follows the log's position: the guiding force."""
+    """Return the force that guides a stage along the logged position, over the logged force.
+
+    The model leaves this force unexplained; `held` contains it. Errors of the motion are NaN.
+    """
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 
@@ -86,7 +90,7 @@ def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
 
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
-    """Return the fraction of a residual's power in its means over the bins of another signal.
+    """Return the fraction of a residual's power that its means over bins of `along` explain.
 
     The part that chance explains is subtracted.
     """

@@ -36,8 +36,8 @@ class InverseModel:
     """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with its data.
 
     `estimates` have intervals; `solution` has the plain coefficients by name ("mass"; per direction "... forward" and
-    "... backward"). The `columns`, shape (rows, columns), have the `covariance` of their coefficients; `time` [s] and
-    forces [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
+    "... backward"). The fit combines the `columns`, shape (rows, columns); `covariance` is that of their coefficients.
+    `time` [s] and forces [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
     """
 
     estimates: tuple[Estimate, ...]
@@ -59,7 +59,7 @@ class InverseModel:
         return self.solution[name]
 
     def estimate(self, name: str) -> Estimate:
-        """Return the estimate of one of the quantities that every inverse model has."""
+        """Return the estimate of a quantity by its name, such as "mass" or "coulomb"."""
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
 
@@ -219,7 +219,7 @@ def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _other_sign(log: Log) -> str:
-    """Write the scale with which the force of a log would be read with the opposite sign."""
+    """Write the scale, such as "-35 N/V", that reads the force of a log with the opposite sign."""
     scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
     scale = next((match for match in scales if match), None)
     if scale is None:

@@ -62,40 +62,41 @@ class Prior:
     made_up: Collection[str] = ()
 
     def flat(self, log: Log) -> dict[str, Any]:
-        """Return the flat keys of the stage as set up for a log; {} without a stage.
+        """Return the stage for a log as flat keys such as friction.static, with SI values.
 
-        Raises InputError.
+        Changes that the log's [setup] states are included. Returns {} without a stage. Raises InputError for changes
+        that the stage does not take.
         """
         return {} if self.stage is None else as_set_up(self.stage, log)
 
     def user_told(self, key: str, log: Log) -> bool:
-        """Tell whether the user stated a key of the stage as set up for a log.
+        """Tell whether the user stated a key, in the stage file or in the log's [setup].
 
-        Raises InputError.
+        Raises InputError for a [setup] that the stage does not take.
         """
         return self.from_user and key not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
-        """Return the flat keys of the stage, with values from other experiments.
+        """Return the stage for a log as flat keys, with the values that other experiments gave.
 
-        Raises InputError.
+        Raises InputError for a [setup] that the stage does not take.
         """
         return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
 
     def masses(self, log: Log) -> tuple[float, float]:
         """Return the assumed mass [kg] of the cart and of the stage, 0 if not known.
 
-        Raises InputError.
+        Raises InputError for a [setup] that the stage does not take.
         """
         believed = self.believed(log)
         return float(believed.get("masses.cart", 0.0)), float(believed.get("masses.stage", 0.0))
 
 
 def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
-    """Return the flat keys of the stage as set up for a log.
+    """Return a stage with the changes that a log's [setup] states, as flat keys with SI values.
 
     Keys that the stage does not have are left out (`left_out`), except for a controller of another form, which replaces
-    the stage's. Raises InputError.
+    the stage's. Raises InputError for changes that the stage does not take.
     """
     setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
     changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
@@ -106,19 +107,19 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
 
 
 def left_out(stage: Stage, log: Log) -> list[str]:
-    """List the keys in the set-up of a log that the stage does not have."""
+    """List the keys in the [setup] of a log that the stage does not have."""
     return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
 
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
-    """Return estimates that are independent of one another, with their correlation."""
+    """Return the estimates that have a value, as independent of one another: correlations of 0."""
     certain = determined(estimates)
     return certain, np.eye(len(certain))
 
 
 @dataclass(frozen=True)
 class Predictor(Generic[Result]):
-    """Prediction of another log by a result, with prior knowledge of the machine.
+    """How a kind of experiment predicts another log from its result and the prior knowledge.
 
     `predict` returns the prediction, or None for a log that it cannot predict. `needs` states the requirements in
     words. `check` raises InputError, before any fit, if logs will not meet them.
@@ -137,15 +138,15 @@ class ExperimentKind(Generic[Result]):
     file from the result, and `correlated` their correlation. `after` names the kinds whose results it uses.
 
     `roles` are the channels that a log needs; of alternatives separated by |, the first that is mapped, or the last.
-    `si` tells that channels must be in SI units, except for the `foreign` roles (a force in volts). `per_unit` tells
-    that the analysis works in any unit of force, with results such as kg per volt. `partial` tells whether a log shows
-    too little by itself, such as one event; such logs are joined to one log with gaps. `together` tells that all logs
-    are realisations of one experiment; `responses` that frequency responses from another instrument are accepted.
+    `si` is true if channels must be in SI units, except for the `foreign` roles (a force in volts). `per_unit` is true
+    if the analysis works in any unit of force, with results such as kg per volt. `partial` returns true for a log that
+    shows too little by itself, such as one event; such logs are joined to one log with gaps. `together` is true if all
+    logs are realisations of one experiment, `responses` if frequency responses from another instrument are accepted.
 
     `claims` returns why a log without a stated kind may be of this kind, or None; `claims_together` does so for several
     logs together. `around` makes a stage with assumed values for a log if none is given. `notes` are remarks on results
-    for the engineer, with or without a stage; `doubts` are sentences against trusting a result, and `failed` tells
-    whether its analysis failed, even if parts of it hold. Functions raise InputError for logs that cannot be used.
+    for the engineer, with or without a stage; `doubts` are sentences against trusting a result. `failed` returns true
+    if the analysis failed, even if parts of the result hold. Functions raise InputError for logs that cannot be used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
@@ -168,7 +169,7 @@ class ExperimentKind(Generic[Result]):
     failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return the roles that a log with the given mapped roles needs."""
+        """Return the roles that a log needs, such as position, given the roles that it has."""
         choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 

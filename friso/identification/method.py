@@ -120,7 +120,8 @@ def with_laws(
 ) -> Identification:
     """Return an identification with the friction laws that its logs support.
 
-    Fits start from `base` if its law allows that. Raises InputError as `compare_laws`.
+    Fits start from `base` if its law allows that. Raises InputError if no log shows friction before sliding, and for a
+    law without stiction.
     """
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
@@ -130,7 +131,7 @@ def with_laws(
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
-    """Tell whether no estimate is determined or bounded, unless the analysis `failed`."""
+    """Tell whether no estimate has a value or, unless the analysis `failed`, a finite bound."""
     ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
     none_determined = not any(estimate.determined for estimate in estimates)
     return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))
@@ -180,9 +181,9 @@ def predict(
 ) -> Prediction:
     """Predict another log of the machine by the first experiment that can.
 
-    Kinds that use results of other kinds come first. The prediction uses the one experiment's stage, not the
-    combination, so that errors are from one record to another. The controller is taken from `base`, or from the log's
-    own set-up. Raises InputError if no experiment can.
+    Kinds that use results of other kinds come first. The prediction uses the stage of this one experiment, not of all
+    combined, so that errors are from one record to another. The controller is taken from `base`, or from the log's own
+    [setup]. Raises InputError if no experiment can.
     """
     prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
@@ -211,7 +212,7 @@ def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
-    """Write, for each log, which keys of its set-up the stage does not have."""
+    """Write, for each log, which keys of its [setup] the stage does not have."""
     several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
     return [
         f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
@@ -221,7 +222,7 @@ def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
 
 
 def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
-    """Return the logs by experiment, in the order of analysis."""
+    """Return the logs of each experiment with its kind, in the order of analysis."""
     return [
         (name, group)
         for name in in_order()
@@ -254,7 +255,10 @@ def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
 def _correlations(
     experiments: Sequence[Experiment], estimates: Sequence[Estimate], fits: Fitting, stage: Stage
 ) -> Correlations:
-    """Return correlations of the stage file's keys, and of keys that follow from others."""
+    """Return the correlations between uncertain keys of the identified stage.
+
+    A key that follows another one has the other's correlations. Keys that are correlated with no other are left out.
+    """
     keys, matrix = correlations(
         _every_estimate(experiments),
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],

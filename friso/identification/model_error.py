@@ -1,4 +1,4 @@
-"""Widen intervals of the whole model by its model error, or replace its estimates by the inverse model's."""
+"""Widen intervals of the whole model by its unexplained part, or replace its estimates."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CONTRADICTED = "the whole model contradicts the record"
 
 
 def allowed_for(case: KeyCase) -> KeyCase:
-    """Return the case with intervals that include the model error and the causes found.
+    """Widen the intervals of a log's estimates by the model error and the causes found.
 
     If the fit does not describe the record, nothing is reported; if the fit contradicts the record, the inverse model's
     estimates replace it. Effects that the model lacks can look like bristles: with a load behind a coupling of 40 Hz,
@@ -66,7 +66,7 @@ def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Return estimates and correlation from the inverse model; other keys are withheld."""
+    """Return estimates and correlation from the inverse model; other keys have no value."""
     sources, answers = inverse_sources(flat), []
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
@@ -86,10 +86,10 @@ def with_model_error(
 ) -> Estimate:
     """Return an estimate of the whole model whose interval includes the model error.
 
-    The interval is extended by its distance from the inverse model's interval, times `lacking`, the fraction of the
-    residual that is not noise. It is no narrower than the inverse model's interval times `alike`, which is 1 if both
-    models have equal residuals, because shared errors move both. `scale` is the factor from the inverse model's
-    quantity to the key.
+    The interval is extended by the distance of its value from the inverse model's interval, times `lacking`, the
+    fraction of the residual that is not noise. It is no narrower than the inverse model's interval times `lacking` and
+    `alike`, which is 1 if both models have equal residuals, because shared errors move both. `scale` is the factor from
+    the inverse model's quantity to the key. An estimate without a value is returned unchanged.
     """
     if not (estimate.determined and inverse.determined):
         return estimate
@@ -120,7 +120,10 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Extend intervals to the values from the log when corrected for each cause."""
+    """Return estimates by key, extended to the values of the log corrected for each cause.
+
+    The result is empty unless the record has a fault.
+    """
     if not case.quality.spoilt:
         return {}
     answers = {}
@@ -134,7 +137,7 @@ def _with_causes(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _imitated_by_causes(case: KeyCase) -> dict[str, str]:
-    """Return reasons, by key, against reporting non-inverse-model quantities of faulty records."""
+    """Return, by key, why a faulty record does not show keys outside the inverse model."""
     others = case.determined.keys() - inverse_sources(case.flat).keys() if case.quality.spoilt else ()
     return dict.fromkeys(others, SPOILT)
 
@@ -158,18 +161,20 @@ def _wider(estimate: Estimate, much: bool) -> Estimate:
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """Return a quantity of the inverse model corrected for a cause, and its remaining error.
+    """Return a quantity of `model`, corrected for a cause, and its remaining error.
 
-    The correction may be incomplete, at most by as much again.
+    `inverse` is the model before the correction. The correction may be incomplete; as much again may be missing at
+    most.
     """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))
 
 
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
-    """Return an estimate whose interval also covers another one, and `further`, times `scale`.
+    """Return an estimate whose interval also covers another one, times `scale`.
 
-    Both estimates count, because it is undecided which is right; `further` is in the unit of `other`.
+    Both estimates count, because it is undecided which is right. The other's interval is extended by `further`, in its
+    unit.
     """
     if not (estimate.determined and other.determined):
         return estimate

@@ -32,8 +32,9 @@ from friso.progress import Progress, between, silent
 from friso.stage.controllers import CONTROLLER
 
 FITTED, REPEATED = 0.8, 0.92
-"""Progress of the analysis at the ends of its steps: the fit, and its repetition on simulated logs. Fits of either
-direction alone are the last step."""
+"""Fractions of the analysis that are done after the fit, and after its repetition on simulated logs. Fits of either
+direction alone are the last step.
+"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,10 @@ class IdentifiedMoves:
 
     @property
     def flat(self) -> dict[str, Any]:
-        """Return the fitted stage as flat keys; keys that the record does not determine stay as given."""
+        """Return the fitted stage as flat keys such as friction.static, with SI values.
+
+        Keys that the record does not determine stay as given.
+        """
         return self.fit.stage
 
 
@@ -89,10 +93,11 @@ def identify_moves(
 ) -> IdentifiedMoves:
     """Identify mass, friction and other keys of a stage from a log of moves.
 
-    With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the logged reference;
-    otherwise the model follows the logged position. `bandwidth` [Hz] is the motion's, read from the force by default.
-    If the force is not in newtons (not allowed with `own_loop`), estimates are per unit of force. The inverse model's
-    estimates are reported as soon as they are known. Raises InputError for a log without position or force.
+    `flat` has the stage as flat keys with SI values. With `own_loop` its controller is the machine's, and the closed
+    loop is simulated on the logged reference; otherwise the model follows the logged position. `bandwidth` [Hz] is the
+    motion's, read from the log by default. If the force is not in newtons (not allowed with `own_loop`), estimates are
+    per unit of force. `tell` gets the inverse model's estimates as soon as they are known. Raises InputError for a log
+    without position or force.
     """
     settings = IdentificationSettings.current()
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
@@ -131,9 +136,10 @@ def identify_moves(
 
 
 def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage, acceleration: np.ndarray) -> KeyCase:
-    """Return the case with estimates by key, as changed by doubts.
+    """Return the case with an estimate for each key, after all doubts about them were examined.
 
-    `acceleration` [m/s^2], shape (n,), is smooth.
+    `answer` has the fit with its intervals, and `covered` the speeds and displacements of the motion. `acceleration`
+    [m/s^2], shape (n,), is smooth.
     """
     fit, inverse, quality = doubted.fit, doubted.inverse, doubted.quality
     if quality.rejected:
@@ -152,7 +158,7 @@ def _with_estimates(doubted: FitCase, answer: IdentifiableFit, covered: Coverage
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """A simulation of another log of one axis, with the estimates of the first.
+    """A simulation of a log, with the estimates from another log of the same axis.
 
     Fields are the samples used, the simulated record and its errors; `apart` is the largest deviation among machines
     drawn from the estimates, relative to the position (infinite if one diverges).
@@ -167,8 +173,8 @@ class SimulatedLog:
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
     """Simulate another log of an identified axis with its estimates.
 
-    `set_up` has the flat keys of the stage as set up for this log, of which the controller and changed keys are used.
-    Raises InputError where the machine's own loop is not known.
+    `set_up` has the stage for this log as flat keys, of which the controller and changed keys are used. Raises
+    InputError where the machine's own loop is not known.
     """
     if moves.loop is None:
         expected = "the machine's own controller, with which another record can be simulated"
@@ -184,9 +190,9 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """Set up the stage and its parameters on another log, with that log's own set-up.
+    """Set up the stage and parameters of a fit on another log, with that log's own [setup].
 
-    `set_up` holds its controller and the `changed` keys.
+    `set_up` has the stage for that log as flat keys; its controller and the `changed` keys are used.
     """
     check_roles(log, ("position", "force", "reference"))
     flat = dict(problem.flat)
@@ -213,9 +219,9 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
 def _problems(
     log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
 ) -> tuple[Problem, Problem | None]:
-    """Set up two problems: the stage that follows the log, and the stage in its own loop.
+    """Set up two fits: of the stage that follows the log, and of the stage in its own loop.
 
-    Both problems have all parameters of their equations.
+    Both have all parameters of their equations. The second is None without `own_loop`.
     """
     settings = IdentificationSettings.current()
     speed = float(
@@ -233,7 +239,7 @@ def _problems(
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
-    """Return the cart's fraction of the mass if it is measured on a free joint, otherwise 0."""
+    """Return the cart's fraction of the mass if a free joint's cart is measured, otherwise 0."""
     if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])

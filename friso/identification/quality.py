@@ -34,7 +34,7 @@ class Quality:
     inverse model, and by steady friction and mass of the whole model on the samples of the inverse model. `findings`
     are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). `without` has inverse
     models of the log corrected for a cause. A record is `spoilt` if its fault passes for friction at low speed, and
-    `unsettled` if a large residual has no known cause. `seen` tells that the samples themselves show a cause, such as
+    `unsettled` if a large residual has no known cause. `seen` is true if the samples themselves show a cause, such as
     clipping; no other effect is named then.
     """
 

@@ -30,7 +30,7 @@ RecordedSamples = tuple[np.ndarray, np.ndarray]
 class Recorded(Motion):
     """A reference from a channel of a file: CSV, MAT, TwinCAT, or any other log.
 
-    Its first value counts as 0; its last value is held to the end.
+    The first value counts as 0; the last value is held to the end.
     """
 
     kind: Literal["recorded"]
@@ -85,7 +85,10 @@ class Recorded(Motion):
 
 
 def _samples(flat: Mapping[str, Any]) -> RecordedSamples:
-    """Return the samples of a record. Raises InputError for a file that has none, or gaps."""
+    """Return the samples of a record.
+
+    Raises InputError for a file without samples, or with gaps.
+    """
     path = Path(flat[FILE])
     try:
         state = path.stat()
@@ -110,7 +113,10 @@ def _read(
 
 
 def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | None, axis: str) -> RecordedSamples:
-    """Return sample times [s] and reference [m] as stored in a file. Raises LogError."""
+    """Return sample times [s] and reference [m] as stored in a file.
+
+    Raises LogError for a file that cannot be read, or one without such channels.
+    """
     from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps
     from friso.identification.logs.mapping import Mapping as Told
@@ -139,7 +145,10 @@ def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | Non
 
 
 def _check(times: np.ndarray, values: np.ndarray) -> None:
-    """Check that a record has finite, increasing times and values. Raises InputError."""
+    """Check that a record has finite, increasing times and values.
+
+    Raises InputError if it does not, or if it has gaps.
+    """
     from friso.identification.logs.time_base import gaps
 
     if times.size < 2:
@@ -160,7 +169,7 @@ def _check(times: np.ndarray, values: np.ndarray) -> None:
 
 
 def _in_keys(example: str) -> str:
-    """Rewrite command-line options of a log, in an example, as keys of [motion]."""
+    """Rewrite an example of the options --map, --unit and --dt as keys of the table [motion]."""
     words = shlex.split(example)
     keys = []
     for option, value in zip(words[::2], words[1::2], strict=False):

@@ -50,13 +50,14 @@ class LogFile:
 
 
 class OpenQuestions(GapsError):
-    """Error with the missing information of several logs."""
+    """Error that lists what the user must still state about several logs."""
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
-    """Read the files, mapped by the options or by stored mappings beside them or in `folder`.
+    """Read log files; the options or stored mappings say which channel is what.
 
-    Raises OpenQuestions for everything that is missing, InputError for unreadable files.
+    Mappings are stored beside a file or in `folder`. Raises OpenQuestions for everything that is missing, InputError
+    for unreadable files.
     """
     files, wrong = read_usable(paths, options, folder)
     if wrong:
@@ -109,7 +110,7 @@ def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Pa
 
 
 def _asked_once(alike: Sequence[GapsError]) -> list[LogError]:
-    """Return open questions about logs with equal channels once, as most logs suggest them.
+    """Merge open questions about logs with equal channels; the most frequent suggestions count.
 
     A log with little motion may suggest other channels than the rest, but options hold for all logs.
     """
@@ -125,9 +126,9 @@ def _asked_once(alike: Sequence[GapsError]) -> list[LogError]:
 
 
 def _recognised_together(files: list[LogFile]) -> list[LogFile]:
-    """Give files without a stated kind the kind that recognises them as one experiment.
+    """Set the kind of experiment of files without a stated one, if they are recognised together.
 
-    Without such a kind, the files are returned unchanged.
+    If no kind recognises them as one experiment, the files are returned unchanged.
     """
     kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
     courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
@@ -166,7 +167,7 @@ def _holders(options: Mapping, paths: Sequence[Path]) -> dict[str, list[bool]]:
 
 
 def _applicable(options: Mapping, place: int, holders: dict[str, list[bool]]) -> Mapping:
-    """Return the options about channels that file number `place` has.
+    """Return the options that apply to file number `place`: those about channels that it has.
 
     `holders` tells, by channel, which files have it. Options about channels that no file has are kept, and raise an
     error when the file is read.
@@ -211,7 +212,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
-    """Return a log without a stated kind, its kind of experiment, and the reason.
+    """Read a log whose kind of experiment is not stated; return it, its kind, and the reason.
 
     Raises GapsError for everything that is missing, including units that most kinds need.
     """
@@ -237,7 +238,10 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
 
 
 def _without_clock(path: Path, mapping: Mapping) -> Log | None:
-    """Return a log without known sample times, to describe its course; None if impossible."""
+    """Read a log without known instants as if sampled every second; None if impossible.
+
+    The motion of this log then shows the kind of experiment.
+    """
     try:
         return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
     except LogError:

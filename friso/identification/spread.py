@@ -32,10 +32,10 @@ def correlation_length(residual: np.ndarray) -> int:
 
 
 def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return groups of samples whose errors may be correlated, each of shape (n,).
+    """Number groups of samples whose errors may be correlated; three arrays of shape (n,).
 
-    Groups are blocks of time, of position [m], and of velocity [m/s], by sign of the acceleration [m/s^2]. Model errors
-    recur with place and speed, so a repeated motion gives no new information.
+    Groups are blocks of time, of position [m], and of velocity [m/s], split into speeding up and slowing down by the
+    acceleration [m/s^2]. Model errors recur with place and speed, so a repeated motion gives no new information.
     """
     settings = IdentificationSettings.current()
     return (
@@ -81,7 +81,10 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.nd
 
 
 def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, (n, p), whose neighbours are correlated."""
+    """Return the covariance of the sum of scores, (n, p), whose neighbours are correlated.
+
+    Scores are the columns of the fit times the residual, (n,).
+    """
     count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(IdentificationSettings.current().row_share_of_likeness * count)))
@@ -93,10 +96,10 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores, (n, p), which are correlated within groups.
+    """Return the covariance of the sum of scores, (n, p), that are correlated within groups.
 
-    The covariance is scaled for normal intervals of `COVERAGE` deviations. The degrees of freedom count effectively
-    equal groups.
+    Scores are the columns of the fit times the residual. The covariance is scaled for normal intervals of `COVERAGE`
+    deviations. The degrees of freedom count effectively equal groups.
     """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)

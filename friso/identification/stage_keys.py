@@ -70,10 +70,10 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """Complete an estimate that has only one bound, by prior knowledge.
+    """Narrow an estimate without a value to the range that was known beforehand.
 
-    A lower bound of static friction is completed by the highest plausible ratio to Coulomb friction, unless the stage
-    has a value.
+    If static friction has only a lower bound, above the stage's value and Coulomb friction, the highest plausible ratio
+    to Coulomb friction bounds it from above.
     """
     before = stage.uncertain().get(estimate.name)
     if before is not None and not estimate.determined and before.high >= estimate.low and before.low <= estimate.high:
@@ -89,7 +89,10 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
-    """Restrict an estimate to the limits of its key, or return None, with the reason."""
+    """Restrict an estimate to the limits of its key, or return None if that is impossible.
+
+    The second result is the reason for a change, or "".
+    """
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
         knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
@@ -110,7 +113,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    """Write the finite ends of an estimate, each with its name."""
+    """List the finite ends of an estimate, each named "at least" or "at most"."""
     return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
 
 
@@ -128,7 +131,9 @@ def _static_above(
 ) -> dict[str, str]:
     """Change `estimates` so that static friction is no smaller than Coulomb friction.
 
-    The less certain of both follows the other in the stage's ratio.
+    A range of static friction is cut from below. Otherwise static friction follows an estimate of Coulomb friction, or
+    else Coulomb friction follows static friction, in the stage's ratio. Returns which key follows which; `notes` get a
+    sentence.
     """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
@@ -160,7 +165,7 @@ def _static_above(
 def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:
     """Return the estimates with which the stage file is valid.
 
-    A key that breaks a rule of the stage file is removed from `estimates`.
+    A key that breaks a rule of the stage file is removed from `estimates`, and `notes` say so.
     """
     units = [[key for key in (COULOMB, STATIC) if key in estimates]]
     units += [[key] for key in estimates if key not in (COULOMB, STATIC)]

@@ -40,7 +40,10 @@ class StateSpace(RationalController):
 
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
-        """Return the zeros and poles of the matrices. Raises InputError."""
+        """Return the zeros and poles of the matrices.
+
+        Raises InputError for unusable matrices, or if no error makes a force.
+        """
         a, b, c, d = _matrices(flat)
         size = len(a)
         poles = np.linalg.eigvals(a)
@@ -63,7 +66,10 @@ class StateSpace(RationalController):
 
 
 def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:
-    """Return the matrices a, b, c and d. Raises InputError."""
+    """Return the matrices a, b, c and d.
+
+    Raises InputError if a matrix is missing or has a wrong shape.
+    """
     texts = [flat[f"controller.{name}"] for name in NAMES]
     if (file := flat.get("controller.file")) is None:
         matrices = [_parsed(name, text) for name, text in zip(NAMES, texts, strict=True)]
@@ -82,7 +88,10 @@ def _matrices(flat: Mapping[str, Any]) -> list[np.ndarray]:
 
 
 def _parsed(name: str, text: str) -> np.ndarray:
-    """Parse a matrix that is written as in MATLAB. Raises InputError."""
+    """Parse a matrix that is written as in MATLAB.
+
+    Raises InputError for a text that is no matrix.
+    """
     rows = [row.replace(",", " ").split() for row in text.strip().strip("[]").split(";") if row.strip()]
     try:
         return np.array([[float(number) for number in row] for row in rows]).reshape(len(rows), -1)
@@ -92,7 +101,10 @@ def _parsed(name: str, text: str) -> np.ndarray:
 
 
 def _from_file(path: Path, names: list[str]) -> list[np.ndarray]:
-    """Return matrices by their names in a file of MATLAB. Raises InputError."""
+    """Return matrices by their names in a file of MATLAB.
+
+    Raises InputError for a missing file or variable.
+    """
     from friso.identification.logs.binary import is_hdf5
     from friso.identification.logs.confined import content
     from friso.identification.logs.libraries import content_by

@@ -1,4 +1,4 @@
-"""Which experiments show a key of the stage file, in words."""
+"""Say which experiments show a key of the stage file."""
 
 from __future__ import annotations
 

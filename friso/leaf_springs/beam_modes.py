@@ -44,9 +44,10 @@ class Reduced:
 
     @classmethod
     def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
-        """Reduce the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf.
+        """Reduce a leaf to its stage end and a few modes.
 
-        The torsion of the beam is replaced by the torsion of a plate.
+        `stiffness` [N/m, N, N m] and `mass` [kg, kg m, kg m^2] are those of its nodes. The torsion of the beam is
+        replaced by the torsion of a plate.
         """
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()
@@ -102,7 +103,7 @@ def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
-    """Return the lowest modes, and all modes of the stage.
+    """Return the lowest modes of stage and leaves, and all modes in which the stage moves much.
 
     The drive mode comes first, the others by frequency.
     """
@@ -165,12 +166,15 @@ def end_motions(offsets: np.ndarray) -> np.ndarray:
 
 
 def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Return the effect on the stage of a matrix that acts at all stage ends."""
+    """Sum a matrix (6, 6) at the stage end of each leaf to the matrix that acts on the stage.
+
+    `ends` (leaves, 6, 6) tells how the stage ends follow the stage.
+    """
     return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
 
 
 def _rows(offsets: np.ndarray) -> np.ndarray:
-    """Return orthonormal patterns of the leaves, one in each row.
+    """Return orthonormal patterns of motion among the leaves, one in each row.
 
     The first is uniform, the second linear in the position of the leaf, and the rest complete the set.
     """

@@ -1,12 +1,14 @@
 """Model the leaves of a mechanism as geometrically exact beams of exudyn.
 
 The module computes forces, stiffness and mass of the nodes. Only this module knows exudyn. A leaf is a chain of equal
-two-node elements of constant strain. Three corrections keep few elements exact. An element misses bending because its
-moment is taken as constant; that bending is added to its shear flexibility (residual bending flexibility: h^2/(12 E I)
-per force). Its bent middle carries mass beyond the straight line between its nodes; that mass is added to its rotary
-inertia (rho A h^2/6). What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the
-stiffness of the plate in parallel motion, under a constant torque, and under the torque that a force across the
-deflected leaf adds.
+two-node elements of constant strain. Three corrections keep few elements exact:
+
+- An element misses bending because its moment is taken as constant. That bending is added to its shear flexibility
+  (residual bending flexibility: h^2/(12 E I) per force).
+- The bent middle of an element carries mass beyond the straight line between its nodes. That mass is added to its
+  rotary inertia (rho A h^2/6).
+- What the leaf has as a plate (plate.py) is averaged over the element. The whole leaf then has the stiffness of the
+  plate in parallel motion, under a constant torque, and under the torque that a force across the deflected leaf adds.
 """
 
 from __future__ import annotations
@@ -103,11 +105,14 @@ class Configuration:
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
     def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
-        """Return the configuration moved along a rate by a factor."""
+        """Return the configuration plus `factor` times the displacements in `rate`."""
         return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
 
     def state(self, offsets: np.ndarray) -> np.ndarray:
-        """Return the state of all nodes, shape (leaves, nodes, 6)."""
+        """Return the state of all nodes, shape (leaves, nodes, 6).
+
+        `offsets` [m] are the places of the leaves along z.
+        """
         x, z, turn = self.stage
         leaves, inner, _ = self.inner.shape
         state = np.zeros((leaves, inner + 2, COORDINATES))
@@ -136,11 +141,11 @@ class Condensed:
     def of(
         cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
     ) -> Condensed:
-        """Condense the stiffness of the leaves and the forces on their nodes.
+        """Condense the stiffness of the leaves and the forces on their nodes onto the stage.
 
-        Of each node, the coordinates which, which + 2 and which + 4 are used. `ends` (leaves, 3, 3) tells how the leaf
-        ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the forces
-        exert there.
+        Of each node, the coordinates `which`, `which` + 2 and `which` + 4 are used. `ends` (leaves, 3, 3) tells how the
+        leaf ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the
+        forces exert there.
         """
         matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)
@@ -157,7 +162,7 @@ class Condensed:
 
 
 def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
-    """Add the nodes and elements of a leaf."""
+    """Add the nodes and elements of a leaf to a system of exudyn."""
     h = float(mechanism.length) / elements
     middles = h * (np.arange(elements // 2) + 0.5)
     half = [
@@ -209,9 +214,9 @@ def _inside(h: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Return the compliance in bending of elements.
+    """Return the bending compliance of elements relative to a plain beam, shape (elements,).
 
-    It is weighted by the square of the moment in parallel motion.
+    Its mean over an element is weighted by the square of the moment in parallel motion.
     """
     s = _inside(h, middles)
     return (
@@ -222,7 +227,7 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
 
 
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
-    """Return the compliance in torsion of elements.
+    """Return the torsional compliance of elements relative to a plain beam, shape (elements,).
 
     It follows `plate.free_twist`, so that a constant torque meets the stiffness of the plate. It is tilted so that the
     torque of a force across the deflected leaf, s^3, meets it too.

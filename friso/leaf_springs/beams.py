@@ -26,7 +26,8 @@ PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 class HeldEquilibrium:
     """Equilibrium with the stage held at z.
 
-    It holds the place and its rate per z, the force along z, and the tangent stiffness (6, 6) of the stage.
+    `place` is the configuration, and `rate` its change per z. `force` [N] holds the stage along z, and `stiffness` (6,
+    6) is the tangent stiffness of the stage.
     """
 
     place: Configuration
@@ -90,7 +91,10 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
 
 
 def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
-    """Return the next equilibrium at z, reached in as few steps as possible."""
+    """Return the equilibrium at z [m], reached from the last of `held` in few steps.
+
+    The number of steps doubles until one succeeds. Raises BeamFailure if none does.
+    """
     settings = LeafSpringSettings.current()
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
@@ -108,7 +112,7 @@ def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium]
 
 
 def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
-    """Extrapolate to z from the last two equilibria and their rates.
+    """Extrapolate to z [m] from the last two equilibria and their rates.
 
     With a single equilibrium, its rate is used.
     """
@@ -127,7 +131,10 @@ def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
 
 
 def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
-    """Find the equilibrium at the z of a place by Newton's method."""
+    """Find the equilibrium at the z of a configuration by Newton's method, starting from it.
+
+    Raises BeamFailure if the method does not converge.
+    """
     settings = LeafSpringSettings.current()
     z = place.stage[1]
     close = (
@@ -152,7 +159,7 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 class LinearisedLeaves:
     """A configuration linearised in the plane of motion.
 
-    It holds the change that leads to equilibrium at the same z, and the energy of that change.
+    `change` leads to equilibrium at the same z, `energy` is that of the change, and `force` [N] then holds the stage.
     """
 
     plane: Condensed
@@ -182,7 +189,7 @@ def _condensed(
 def _held(
     mechanism: Mechanism, place: Configuration, solved: LinearisedLeaves, stiffness: np.ndarray, forces: np.ndarray
 ) -> HeldEquilibrium:
-    """Return the equilibrium next to a place."""
+    """Return the equilibrium to which the linearised leaves lead from a configuration."""
     plane = solved.plane
     rate = np.array([0.0, 1.0, 0.0])
     rate[::2] = -np.linalg.solve(plane.stiffness[::2, ::2], plane.stiffness[::2, 1])

@@ -41,7 +41,7 @@ def drive_stiffness(mechanism: Mechanism) -> Any:
 def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
     """Return the stiffness along the motion under the load along the leaves.
 
-    It vanishes at the buckling load.
+    The stiffness vanishes at the buckling load.
     """
     return drive_stiffness(mechanism) * (1 - mechanism.load / buckling_load(mechanism))
 
@@ -64,7 +64,7 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the leaves while all other coordinates are held.
 
-    It falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
+    The stiffness falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
     """
     straight = mechanism.leaves * axial(mechanism) / mechanism.length
     stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
@@ -74,8 +74,8 @@ def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the width while all other coordinates are held.
 
-    It contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it by 4 delta
-    (s/L)^3, with s from its middle, without the warping that its clamps forbid.
+    The stiffness contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it
+    by 4 delta (s/L)^3, with s from its middle, without the warping that its clamps forbid.
     """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism
@@ -139,7 +139,8 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 def _mode_stiffening(mechanism: Mechanism) -> Any:
     """Return the plate's stiffening for moments that change sign along the leaf, as in a mode.
 
-    It is that of parallel motion. The even share of the moments lies far from the clamps and has little influence.
+    The value for parallel motion is used. The even share of the moments lies far from the clamps and has little
+    influence.
     """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
@@ -147,7 +148,7 @@ def _mode_stiffening(mechanism: Mechanism) -> Any:
 def leaf_torsion(mechanism: Mechanism) -> Any:
     """Return the frequency of the first torsional mode of a leaf between its clamps.
 
-    It is Rayleigh's quotient of the twist under a constant torque along the leaf.
+    The frequency follows from Rayleigh's quotient for the twist under a constant torque along the leaf.
     """
     rate = plate.warping_rate(mechanism.width, mechanism.poisson)
     nodes, weights = np.polynomial.legendre.leggauss(24)

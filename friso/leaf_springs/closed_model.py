@@ -18,7 +18,7 @@ from friso.leaf_springs.settings import LeafSpringSettings
 def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
     """Evaluate the mechanism by closed forms over its stroke [m].
 
-    Its drive stiffness is equal at all deflections.
+    The drive stiffness is equal at all deflections.
     """
     settings = LeafSpringSettings.current()
     deflections = np.linspace(0.0, stroke, settings.closed_deflections)

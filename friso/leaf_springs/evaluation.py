@@ -77,7 +77,7 @@ class Evaluation:
     def loaded_drive(self) -> float:
         """Return the drive stiffness [N/m] at deflection 0 under the load along the leaves.
 
-        It vanishes at the buckling load.
+        The stiffness vanishes at the buckling load.
         """
         return float(self.drive[0] * (1 - self.mechanism.load / self.buckling))
 
@@ -135,10 +135,10 @@ class Evaluation:
 
 
 def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
-    """Return how far a mode's resonance rises above the line of the stage's mass.
+    """Return how far a mode's resonance rises above the line of the stage's mass, as a factor.
 
-    It follows from the mode's motion [1/sqrt(kg)] at actuator and sensor: the residue phi_a phi_s over 1/m of the mass,
-    divided by 2 zeta.
+    `actuator` and `sensor` are the mode's motions [1/sqrt(kg)] at these places. Their product, the residue, is divided
+    by 1/m of the stage's mass m and by 2 zeta.
     """
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 

@@ -44,7 +44,7 @@ class VisibleModes:
     """Modes of mechanisms other than the drive mode, arrays of shape (..., 7).
 
     They hold the frequency [Hz], and the residue times the mass of the stage. A residue is positive where actuator and
-    sensor move in phase. Entries at the drive mode are 0.
+    sensor move in phase. Entries at the drive mode are 0. `visible` marks the modes that actuator and sensor both see.
     """
 
     frequency: np.ndarray
@@ -65,9 +65,9 @@ class VisibleModes:
         return cls(frequency, residue, np.abs(residue) > least)
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
-        """Return frequency [Hz] and residue, each (...), of one mode of each mechanism.
+        """Return frequency [Hz] and residue, each (...), of the mode with number `mode` (...).
 
-        They are infinite and 0 if no mode is visible.
+        They are infinite and 0 for a mechanism without a visible mode.
         """
         picked = [
             np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
@@ -78,7 +78,7 @@ class VisibleModes:
 
 
 def first_interfering(mechanism: Mechanism) -> Any:
-    """Return the frequency [Hz] of the lowest interfering mode; infinite if there is none.
+    """Return the frequency [Hz] of the lowest mode that disturbs control; infinite without one.
 
     Actuator and sensor both see the mode, and it is not the drive mode.
     """
@@ -90,7 +90,7 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     """Return frequency [Hz] and residue of the mode whose resonance stands highest in the plant.
 
     Residues are multiplied by the stage's mass. The mode has the largest residue over the square of its frequency. If
-    no mode is visible, the leaves' own mode is returned without weight.
+    no mode is visible, the leaves' own mode is returned with the least residue that the equations allow.
 
     In the equations, a part m_p of the stage's mass m moves on a spring, which gives the residue m_p/(m (m - m_p)). It
     is never negative. If actuator and sensor move against each other, only the size of the residue counts.

@@ -93,7 +93,7 @@ class Mechanism:
         )
 
     def member(self, number: int) -> Mechanism:
-        """Return one of many mechanisms."""
+        """Return a single mechanism out of many, by its number."""
 
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
@@ -136,7 +136,7 @@ class Mechanism:
 
     @property
     def depth(self) -> Any:
-        """Return the distance of the outermost leaves [m]."""
+        """Return the distance between the outermost leaves [m]."""
         return (self.leaves - 1) * self.spacing
 
     @property

@@ -66,7 +66,7 @@ def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
 
 
 def _number(shapes: np.ndarray) -> str:
-    """Return the number of waves as an addition to the name of a shape, from two waves on.
+    """Return the number of waves of a shape as a suffix of its name; "" for one wave.
 
     Waves are counted on the leaf that moves most.
     """

@@ -27,12 +27,13 @@ from 1 to 6 times as long as wide (tests/ritz.py)."""
 
 @dataclass(frozen=True)
 class Curl:
-    """The anticlastic curvature of a leaf under a bending moment, odd ("s") or even ("1") in s.
+    """Curvature across a leaf (anticlastic) that a bending moment along it causes.
 
-    The moment is odd in the parallel motion of its ends, and even where the ends turn against each other.
+    If `odd`, the moment is m = s, as in the parallel motion of the leaf's ends; otherwise m = 1, as where the ends turn
+    against each other.
 
-    g = -nu/(1 - nu^2) (m - a h1 - b h2), where m = s or 1 is the moment per flexural rigidity D w. h1 and h2 decay from
-    the clamps (`rates` [1/m]). a and b make g and its slope 0 there.
+    g = -nu/(1 - nu^2) (m - a h1 - b h2), where m is the moment per flexural rigidity D w. h1 and h2 decay from the
+    clamps (`rates` [1/m]). a and b (`weights`) make g and its slope 0 there.
     """
 
     poisson: Any
@@ -68,7 +69,7 @@ class Curl:
         return moment - sum(terms)
 
     def curvature(self, s: Any, length: Any) -> Any:
-        """Return f'' at s for the moment m."""
+        """Return the curvature f'' along the leaf at s, under the moment m."""
         moment = s if self.odd else 1.0
         return moment + self.poisson**2 / (1 - self.poisson**2) * self.shape(s, length)
 
@@ -85,8 +86,8 @@ def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:
 def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     """Return the factor by which clamps make a leaf stiffer than a beam.
 
-    It grows from 1 for a narrow leaf to 1/(1 - nu^2) for a wide one. Odd: for the parallel motion of its ends, k =
-    factor 12 E I/L^3. Even: for turning them against each other, k = factor E I/L.
+    The factor grows from 1 for a narrow leaf to 1/(1 - nu^2) for a wide one. If `odd`, it is for the parallel motion of
+    the ends, k = factor 12 E I/L^3; otherwise for turning them against each other, k = factor E I/L.
     """
     curl = Curl.of(length, width, poisson, odd)
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
@@ -111,7 +112,7 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:
-    """Return the integral over the leaf of the decaying function times m."""
+    """Return the integral of `_decay` times the moment m over a leaf: m = s if `odd`, else 1."""
     half = rate * length / 2
     return (length * rate / np.tanh(half) - 2) / rate**2 if odd else 2 * np.tanh(half) / rate
 
@@ -160,10 +161,10 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
-    """Multiply compliances in torsion along a leaf (n,) by exp(tilt place^2).
+    """Multiply compliances in torsion along a leaf (n,) by exp(tilt place^2), for some tilt.
 
-    Their sum stays, so that an even torque twists the leaf as before. Their sum weighted by the square of the `torques`
-    (n,) becomes `weighted_sum`.
+    The sum of the compliances stays, so that an even torque twists the leaf as before. Their sum weighted by the square
+    of the `torques` (n,) becomes `weighted_sum`.
     """
     settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()
@@ -185,8 +186,8 @@ def free_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 def stretching(length: Any, width: Any, poisson: Any) -> Any:
     """Return the factor by which a leaf is stiffer along its length than a rod.
 
-    Its clamps keep it from growing narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6 times the
-    width in length, with Poisson's ratios from 0 to 0.45.
+    The clamps of the leaf keep it from growing narrower. The factor is fitted to shells (tests/shells.py) of 0.6 to 6
+    times the width in length, with Poisson's ratios from 0 to 0.45.
     """
     return 1 / (1 - 0.28 * poisson**2 * width / length)
 
@@ -194,7 +195,7 @@ def stretching(length: Any, width: Any, poisson: Any) -> Any:
 def edgewise_shear_factor(length: Any, width: Any, poisson: Any) -> Any:
     """Return the factor by which a leaf is stiffer against shear in its plane than a beam.
 
-    Its bending in that plane is taken as for a beam. The factor is fitted to shells, as in `stretching`.
+    Bending of the leaf in that plane is taken as for a beam. The factor is fitted to shells (tests/shells.py).
     """
     ratio = length / width
     beam = 2.4 * (1 + poisson) * ratio

@@ -1,4 +1,4 @@
-"""Name and colour the cases of a check alike in every figure, sentence and table."""
+"""Name and colour a stage as given, locked and free alike in figures, sentences and tables."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
 
 
 def band_text(band: float) -> str:
-    """Write a settling band in words."""
+    """Write a settling band [m] in words, such as 10 µm."""
     return axis_shown().text(BANDS[band])
 
 
 @dataclass(frozen=True)
 class ShownCase:
-    """One case of a check with its label and its colour."""
+    """A stage as given, with its joint locked, or free: what was checked, its label and colour."""
 
     key: str
     label: str
@@ -35,7 +35,7 @@ class ShownCase:
 
 
 def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
-    """Return the cases, each once.
+    """Return the checked cases to show, each once: as given, locked, free.
 
     If the case "given" equals the locked or the free case, that case is labelled "(as given)".
     """
@@ -44,12 +44,12 @@ def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
 
 
 def case_labels(stage: Stage) -> dict[str, str]:
-    """Return the labels of the cases of a stage that are shown, by name."""
+    """Return the labels of the cases of a stage that are shown, by name: given, locked, free."""
     return _labels([*stage.variants()], stage)
 
 
 def _labels(names: Collection[str], stage: Stage | None) -> dict[str, str]:
-    """Return labels by name.
+    """Return the labels of cases by name, without a case that equals another one.
 
     The label of the case that equals the stage as given says so.
     """

@@ -18,7 +18,7 @@ Files = Mapping[str, Content]
 
 
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
-    """Return every figure in all forms ("png", "svg", "pdf").
+    """Return the files of figures in several formats ("png", "svg", "pdf"), by name.
 
     Each is drawn when it is written, or when a page shows it.
     """
@@ -30,9 +30,9 @@ def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> d
 def image_files(
     figure: Figure, stem: str, forms: Iterable[str] = FORMATS, shown: Iterable[Image] = ()
 ) -> dict[str, Content]:
-    """Return a figure in some forms, in files whose names begin with a stem.
+    """Return the files of a figure in some formats, with names that begin with `stem`.
 
-    It may also be `shown` as such images on a page.
+    `shown` are images of the figure that a page will show; they are drawn beforehand, too.
     """
     forms = [*forms]
     draw_beforehand([figure], [*shown, *map(Image, forms)])

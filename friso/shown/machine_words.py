@@ -1,4 +1,4 @@
-"""Say by how much drawn machines differ from each other."""
+"""Say by how much machines drawn at random differ from each other."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ class Report:
 
     `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
     is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
-    templates of the package `templates`. Pages that are `scripted` load plotly even without figures of their own kind.
+    templates of the package `templates`. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str
@@ -128,9 +128,9 @@ def _escaped_text(value: Any) -> Any:
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """Return the figure as a data address in quotation marks.
+    """Return a figure as a data address in quotation marks.
 
-    It is printed, and seen in browsers without scripts.
+    The image is printed, and seen in browsers without scripts.
     """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
@@ -160,7 +160,7 @@ TENTHS = 10
 def _shortened(path: re.Match[str]) -> str:
     """Write an SVG path in less text.
 
-    Places are relative to the ones before, to a tenth of a point.
+    Each place is relative to the one before, to a tenth of a point.
     """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])
@@ -181,7 +181,7 @@ def _shortened(path: re.Match[str]) -> str:
 
 
 def _tenths(number: int, apart: bool) -> str:
-    """Write a number of tenths.
+    """Write a number of tenths as a decimal number, without a leading 0.
 
     `apart` separates it from a number before it, unless its sign does.
     """

@@ -53,7 +53,7 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
 
 
 def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
-    """Return the measures of recorded runs of the stages `flat`.
+    """Measure recorded runs of stages, given as flat keys: swing, settling, outcome and more.
 
     The force is the drive's command.
     """
@@ -66,7 +66,7 @@ def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
 
 
 def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
-    """Return the measures of the run in a `response`."""
+    """Measure the run in a `response` of a stage: swing, settling, outcome and more."""
     time, status = response["time"].to_numpy(), {one.text: one for one in Status}[response.attrs["status"]]
     deviation = (response["position"] - response["reference"]).to_numpy()[None]
     counts = (np.array([value]) for value in (status, response.attrs["steps"], response.attrs["rejected"]))
@@ -74,7 +74,7 @@ def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
 
 
 def _dataset(stage: Stage, flat: dict[str, Any], recorded: RecordedRuns, rtol: float) -> xr.Dataset:
-    """Return the signals of a recorded run as a dataset, with units, names and status."""
+    """Return the signals of a recorded run over time as a dataset, with units, names and status."""
     import xarray as xr
 
     from friso.engine.kernel import kernel

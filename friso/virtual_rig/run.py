@@ -1,4 +1,4 @@
-"""Run a stage with its real drive, in lanes, and record what the drive would log."""
+"""Run a stage with its real drive many times at once, and record what the drive would log."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class RecordedRuns:
 
 
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the flat keys of a stage with a complete drive.
+    """Return a stage with a complete drive as flat keys such as drive.delay, with SI values.
 
     Properties that the file does not state are ideal. `changes` are SI numbers, or arrays with one for each run.
     """
@@ -65,7 +65,7 @@ def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dic
 
 
 def with_complete_drive(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return flat keys with missing keys of the drive added, at their ideal values."""
+    """Return a stage, given as flat keys, with missing keys of the drive at their ideal values."""
     flat = anywhere(flat)
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": flat.get("drive.integrator_reset", False) * 1.0}
@@ -101,10 +101,11 @@ def run_flat(
     threads: int | None = None,
     outputs: bool = False,
 ) -> Iterator[RecordedRuns]:
-    """Run stages with a complete drive as `run` does, on a floor that may shake.
+    """Run stages with a complete drive several times, on a floor that may shake.
 
-    The stages are given as flat keys. With `outputs`, all signals of the equations are recorded, not only those that
-    the drive and a sensor see.
+    The stages are given as flat keys to SI numbers, or arrays with one for each run. Signals are logged every
+    `interval` [s]; the runs come chunk by chunk. With `outputs`, all signals of the equations are recorded, not only
+    those that the drive and a sensor see. Raises InputError for an interval, a delay or a [rail] that does not fit.
     """
     settings = RigSettings.current()
     _check(flat, interval)
@@ -222,7 +223,7 @@ def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
 def _signals(
     shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: MoveTask, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the signals that the drive logs, and the true ones."""
+    """Return the signals that the drive logs, and the true ones, by role, shape (runs, n) each."""
     time = np.arange(samples.shape[1]) * interval
     position, reading, commanded = (
         samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))

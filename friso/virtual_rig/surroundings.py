@@ -19,7 +19,7 @@ from friso.virtual_rig.task import MoveTask
 
 
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
-    """Return the tables of runs, over place and over time.
+    """Return friction, motor constant, floor and injected force of runs as tables.
 
     Stages are given as flat keys to SI numbers or arrays of shape (runs,). `seeds` are the seeds of the runs' noise;
     rails have the machines' "rail.seed". If the runs do not differ, all share one table.
@@ -36,7 +36,7 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 
 
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
-    """Return evenly spaced places [m] of tables, and their grid, shape (1, 2).
+    """Return the places [m] at which tables have points, and the grid that they form, (1, 2).
 
     The grid holds the first place [m] and the points per metre.
     """
@@ -64,9 +64,9 @@ def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
 
 
 def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
-    """Return injected force and floor acceleration over time, and their points per second.
+    """Return injected force and floor acceleration over time, shape (runs or 1, 2, points).
 
-    Their shape is (runs or 1, 2, points).
+    The second result is the number of points per second.
     """
     settings = RigSettings.current()
     injected = len(task.injected) > 0

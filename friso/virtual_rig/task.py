@@ -20,12 +20,13 @@ SAMPLE_TIME = 50e-6
 
 @dataclass(frozen=True)
 class MoveTask:
-    """The task of runs with the real drive: pieces of the reference, and an injected force.
+    """The task of runs with the real drive: a reference, and an injected force.
 
-    Pieces (see `friso.equations.reference`) have the shape (pieces, 1 + inputs) and a `form`; for runs with different
-    moves the shape is (runs, pieces, 1 + inputs). There are the duration [s], and the injected force [N] every
-    `injected_each` [s], shape (n,), empty for none; the drive logs it unless it is `unknown` to it. The stage starts at
-    rest where the reference does, or displaced from it by `displacement` [m].
+    The reference consists of `pieces`, shape (pieces, 1 + inputs): the start of each, then the numbers of its
+    polynomial or other `form` (`friso.equations.reference`). For runs with different moves the shape is (runs, pieces,
+    1 + inputs). `duration` is in seconds. `injected` has the injected force [N] every `injected_each` [s], shape (n,),
+    empty for none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the reference does,
+    or displaced from it by `displacement` [m].
     """
 
     pieces: np.ndarray
@@ -63,9 +64,9 @@ def own_motion(stage: Stage) -> MoveTask:
 
 
 def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
-    """Return the motions of stages given as flat keys (see `own_motion`).
+    """Return the motions of stages given as flat keys, each from 0 or from a displacement.
 
-    All runs have the longest duration.
+    A reference that begins with a step jumps after one sample of the drive. All runs have the longest duration.
     """
     several = motion.varies(flat)
     pieces = motion.pieces(flat, runs if several else 1)

@@ -239,9 +239,9 @@ def _in_velocity(axis: AxisParameters, answers: UserAnswers) -> bool:
 
 
 def _of_the_velocity_loop(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> list[OpenQuestion]:
-    """List what an INI file cannot tell about the drive's velocity loop.
+    """List questions about the drive's velocity loop, of which an INI file says nothing.
 
-    They are its gain and its sample time, and the scale of the output unless FF1 is about 1.
+    They ask for its gain and its sample time, and for the scale of the output unless FF1 is about 1.
     """
     gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
     meaning = "gain of the drive's velocity loop, whose integral time, if any, is controller.velocity_integral_time"

@@ -219,7 +219,7 @@ def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
 
 
 def _fastest(axis: AxisParameters) -> str:
-    """Return a velocity limit that no motor reaches in turns per second; "" if there is none."""
+    """Return the name of a velocity limit too high for turns per second; "" if there is none."""
     limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
     return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
 

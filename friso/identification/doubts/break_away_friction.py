@@ -38,7 +38,11 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
-    """Return the break-away friction [N] if it exceeds the interval of static friction, else None."""
+    """Return the friction [N] at which motions begin if above the static friction's interval.
+
+    Returns None otherwise, and with too few ramps in either direction. `determined` has estimates by key, `flat` the
+    fitted stage, and `ramps` the forces at which motions begin.
+    """
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
     if static is None or len(ramps.forces) < ReadingSettings.current().fewest_ramps:
@@ -56,7 +60,10 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return by how much friction may exceed static friction [N] up to given speeds [m/s], (n,)."""
+    """Return by how much friction may exceed static friction [N] at or below speeds [m/s], (n,).
+
+    Viscous friction may rise faster than the Stribeck curve falls.
+    """
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds
     exponent = flat.get("friction.stribeck_exponent", 2.0)

@@ -21,10 +21,10 @@ from friso.identification.settings import DoubtSettings
 
 @dataclass(frozen=True)
 class RecordDrift:
-    """Shifts of fitted numbers, (free,), if friction and a constant force may change.
+    """How friction and a constant force change during a record, and what that shifts.
 
-    `friction` and `constant` [N] are the changes of friction and constant force over the record; their reaches [N] are
-    the largest deviations from the means.
+    `moved`, shape (free,), is the shift of the fitted numbers. `friction` and `constant` [N] are the changes over the
+    record; their reaches [N] are the largest deviations from the means.
     """
 
     moved: np.ndarray
@@ -85,7 +85,10 @@ def changing_forces(
 
 
 def changes_beside(inverse: InverseModel) -> RecordDrift | None:
-    """Return the changes during the record of an inverse model with equal friction both ways."""
+    """Return how friction and constant force change during the record of an inverse model.
+
+    The inverse model has equal friction both ways. Returns None if nothing clearly changes.
+    """
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     bends = _bends(share, counted)
@@ -104,7 +107,10 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
 
 
 def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
-    """Compute the changes along the record from the fitted sizes of their `bends`."""
+    """Compute the changes along a record from the fitted sizes of their shapes, `bends`.
+
+    Returns None if nothing was explained.
+    """
     if explained is None:
         return None
     friction, constant = (part @ np.stack(bends) for part in np.split(explained.sizes, 2))
@@ -113,7 +119,11 @@ def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> 
 
 
 def _reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
-    """Widen the fit's deviations by the changes of friction and constant force, and their shifts."""
+    """Widen the fit's deviations by a drift of friction and constant force, and what it shifts.
+
+    Coulomb friction and the constant force get their largest drift from the mean. All fitted numbers get the shift that
+    the drift causes.
+    """
     further = np.abs(changes.moved)
     for i, name in enumerate(fit.fitted):
         if name == "friction.coulomb":

@@ -52,11 +52,12 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def control_law(case: RecordCase) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Return signals of a linear controller, stretches, and variables on which gains may depend.
+    """Return signals to which a linear controller is fitted, and what its gains may depend on.
 
     The signals, shape (rows, 9), are the error, its derivatives and integral, the motion of the reference and its
-    direction, and last the force [N], all passed through one filter. Rows with a force at its limits are left out, and
-    separate the numbered stretches. The variables have one value per row.
+    direction, and last the force [N]. All of them pass one filter. Rows with a force at its limits are left out; the
+    second result numbers the stretches between them, shape (rows,). The third has time, speed and place by name, shape
+    (rows,) each.
     """
     settings, log, part = DoubtSettings.current(), case.log, case.log.longest
     step, cutoff = log.sample_time, settings.bandwidths_of_a_controller * case.inverse.bandwidth
@@ -100,7 +101,7 @@ def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:
-    """Return the ratio of a force to the usual force, (rows,) [N]; 1 if not proportional."""
+    """Return the factor from the usual force to a force, (rows,) [N]; 1 if not proportional."""
     likeness = float(usual @ force) / (float(np.linalg.norm(usual) * np.linalg.norm(force)) or 1.0)
     if likeness < DoubtSettings.current().likeness_of_a_law:
         return 1.0

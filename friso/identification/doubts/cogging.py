@@ -43,7 +43,10 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def places_along(position: np.ndarray) -> list[np.ndarray]:
-    """Return indicator columns of places along the way [m], each (n,), less their means; the first place has none."""
+    """Return a triangle for each of several places along the way [m], (n,), less its mean.
+
+    The triangle is 1 at its place and 0 from the neighbouring places on. The first place has none.
+    """
     nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
     return [column - column.mean() for column in near[1:]]

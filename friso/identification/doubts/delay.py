@@ -32,7 +32,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the derivative of the log's force, if the stage follows the log."""
+    """Yield the force that a small delay adds, if the stage follows the log.
+
+    It goes with the derivative of the log's force.
+    """
     force = delay_force(case)
     if not case.fit.problem.closed and force.any():
         yield TriedForces([force], [DoubtSettings.current().samples_of_a_tried_delay * case.log.sample_time])

@@ -19,7 +19,10 @@ WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb 
 
 @dataclass(frozen=True)
 class Half:
-    """A quantity of the inverse model in both halves of a record, with an interval over both."""
+    """Mass or friction in either half of a record, by least squares, and a range over both.
+
+    `first` and `second` are the values; the range from `low` to `high` holds both intervals.
+    """
 
     name: str
     first: float
@@ -29,7 +32,10 @@ class Half:
 
 
 def find(case: ValueCase) -> Iterator[RaisedDoubt]:
-    """Compare inverse models of both halves of the record, if the whole model lacks something."""
+    """Compare mass and friction between the halves of a record, each by least squares.
+
+    Nothing is compared if the whole model explains the record nearly to its noise.
+    """
     for one in halves(case.inverse) if case.lacks else ():
         unit = case.inverse.estimate(one.name).unit
         values = f"{one.first:.4g} and {one.second:.4g} {unit}"
@@ -39,7 +45,10 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def halves(inverse: InverseModel) -> list[Half]:
-    """List the inverse model's quantities that differ between the halves beyond both spreads."""
+    """List the mass and frictions of an inverse model that differ between the record's halves.
+
+    They differ by more than chance, given the deviations of both.
+    """
     fits = []
     for part in np.array_split(np.arange(len(inverse.measured)), 2):
         columns, force = inverse.columns[part], inverse.measured[part]

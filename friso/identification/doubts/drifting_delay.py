@@ -1,4 +1,7 @@
-"""Doubt: the delay between force and motion drifts along the record, by two clocks or a filling buffer."""
+"""Doubt: the delay between force and motion drifts along the record.
+
+Two clocks or a filling buffer cause such a drift.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the derivative of the force, and its product with a ramp over the record.
 
-    They are yielded only if a changing delay explains more than a constant one.
+    Nothing is yielded unless a changing delay explains more than a constant one.
     """
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():

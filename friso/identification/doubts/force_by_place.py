@@ -25,7 +25,11 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Return indicator columns of places along the way, each (n,); the first place has none."""
+    """Return a triangle, (n,), by name, for each of several places along the way.
+
+    It is 1 at its place and 0 from the neighbouring places on. The first place has none; a log with few `rows` gives
+    {}.
+    """
     settings = DoubtSettings.current()
     count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)
     if count < 3:

@@ -1,4 +1,4 @@
-"""Doubt: the inertia of a mass is smaller than the residual."""
+"""Doubt: the force that accelerates a mass is smaller than what the fit leaves unexplained."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Compare the inertia of the masses with the residual beyond noise.
+    """Compare the force that accelerates the masses with the residual beyond noise.
 
     Any part of the residual may pass for inertia, so a mass with less inertia is not determined. The mass's relative
     uncertainty is at least the squared ratio of residual to inertia (friso's choice).

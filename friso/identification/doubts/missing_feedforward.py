@@ -63,8 +63,8 @@ def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
 def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
     """Tell whether feedforward [N], (rows,), is missing from the force while the stage is fast.
 
-    It must be missing in both halves of these rows. In a servo that follows well, reference and measured acceleration
-    differ by friction at low speed and by sticking, which feedforward could imitate where the inverse model lacks them,
+    The fit must miss it in both halves of these rows. In a servo that follows well, reference and measured acceleration
+    differ by friction at low speed and by sticking. Feedforward could imitate both where the inverse model lacks them,
     but not where the stage slides.
     """
     settings, speed = DoubtSettings.current(), np.abs(inverse.columns[:, 1])

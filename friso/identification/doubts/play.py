@@ -39,7 +39,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the force that the motor saves while the load is loose, for each width of play.
+    """Yield the force that the motor does not need while its load is loose, by width of play.
 
     The whole mass is taken as load, with and without friction; with friction it slows down while it is loose. Widths
     that the load crosses within a few samples are not tried, because motion between samples would look like play.

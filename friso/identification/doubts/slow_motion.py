@@ -20,9 +20,9 @@ SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Refuse friction of a record that is too slow for the Stribeck effect to decay.
 
-    It shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. If the
-    Stribeck velocity is not determined, it may be the highest of any bearing. If it is, the effect is small at twice
-    that velocity, and hardly depends on the assumed exponent.
+    Such a record shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. If
+    the Stribeck velocity is not determined, it may be the highest of any bearing. If it is, the effect is small at
+    twice that velocity, and hardly depends on the assumed exponent.
     """
     if "friction.stribeck_velocity" not in case.flat:
         return

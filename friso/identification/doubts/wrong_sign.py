@@ -9,7 +9,7 @@ from friso.identification.response.analysis import Bench
 
 
 def find(bench: Bench) -> Iterator[RaisedDoubt]:
-    """Check the sign of the driven mass.
+    """Check whether the driven mass moves against the force.
 
     The phase of a mass line is -180 degrees; 0 degrees means a wrong sign.
     """

@@ -22,7 +22,7 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] from force ramps, in total and per direction, extrapolated to rate 0."""
+    """Static friction [N] from force ramps, in total and per direction, at infinitely slow rise."""
 
     static: Estimate
     forward: Estimate
@@ -60,7 +60,7 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Claim logs with enough force ramps in total, and some in each."""
+    """Return why logs hold force ramps, or None: they need enough in total, and some in each."""
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None

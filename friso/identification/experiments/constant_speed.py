@@ -46,7 +46,7 @@ def _stated_exponent(prior: Prior) -> float | None:
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of friction and constant force, in the order of the covariance.
+    """Return estimates of friction and constant force, in the order of their covariance.
 
     An exponent that the stage states is not included.
     """
@@ -78,9 +78,10 @@ def _partial(log: Log) -> bool:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Claim logs that mostly move at constant speeds, enough for a curve of friction over speed.
+    """Return why logs move at constant speeds, or None.
 
-    At the slowest speeds a body may stick and slip, so logs in one direction are claimed too.
+    Most of their motion must be at constant speeds, enough for a curve of friction over speed. At the slowest speeds a
+    body may stick and slip, so logs in one direction count too.
     """
     settings = ReadingSettings.current()
     speeds = [course.speeds for course in courses]

@@ -21,7 +21,7 @@ from friso.stage import Stage
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
-    """Analyse logs of one bench together, or a frequency response from another instrument."""
+    """Analyse logs of one machine together, or a frequency response from another instrument."""
     (first, *_) = logs
     if not isinstance(first, Log):
         return analyse((), settings.band, measured=first)
@@ -29,7 +29,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log in which a periodic excitation moves a stage whose reference stands.
+    """Return why a log shows a periodic excitation of a stage whose reference stands, or None.
 
     The motion of such a log hardly rests, contains many frequencies, and turns often.
     """
@@ -45,8 +45,8 @@ def _claims(course: Course) -> str | None:
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     """Return estimates of masses and joint from a two-mass model in newtons and metres.
 
-    A mass line alone gives the total mass. A resonance nearer to the parasitic mode than to the joint's mode gives no
-    joint.
+    If only the mass line shows, where the response falls as of one mass, the total mass is returned. A resonance nearer
+    to the parasitic mode than to the joint's mode gives no joint.
     """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
@@ -66,7 +66,7 @@ def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
 
 
 def _of_stage_alone(mass: float, stage: Stage) -> bool:
-    """Tell whether a mass line [kg] shows the stage alone instead of all moving masses.
+    """Tell whether a measured mass [kg] is that of the stage alone, not of all moving masses.
 
     Above the mode of a free joint the stage moves alone. The nearer of the stage's assumed mass and the total decides.
     """
@@ -90,7 +90,10 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
 
 
 def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates; masses that are parts of one sum are fully correlated."""
+    """Return the estimates that have a value, with their correlations.
+
+    Masses that are parts of one sum are fully correlated.
+    """
     certain = determined(estimates)
     if all(estimate.name.startswith("masses.") for estimate in estimates):
         return certain, np.ones((len(certain), len(certain)))

@@ -34,10 +34,10 @@ OUT_OF_STEP = (
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log of moves: its reference moves, or it has no periodic excitation.
+    """Return why a log holds moves, or None.
 
-    Such a log has no series of constant speeds or force ramps. Its position rests in between, or its force has few
-    frequencies, as with sines.
+    The reference of such a log moves, or it has no periodic excitation and no series of constant speeds or force ramps.
+    Without a reference its position rests in between, or its force has few frequencies, as with sines.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
@@ -93,7 +93,7 @@ def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Corre
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
-    """List where the simulated drive differs from the machine's, and missing controllers."""
+    """List notes on simplified drives, on loops not simulated, and on logs used only in part."""
     settings = ExperimentSettings.current()
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]

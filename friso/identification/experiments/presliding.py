@@ -81,10 +81,10 @@ class Presliding:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A fit of mass and bristles at one low-pass.
+    """A fit of mass and bristles to signals below one low-pass frequency.
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is how much of
-    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` tells whether the
+    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` is true if the
     search for the bending stopped at a limit, and `left` is the unexplained fraction of the friction. Low-passed
     signals over time [s], shape (n,), are the position of the body on the bearing, its force and the model's.
     """
@@ -105,7 +105,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Estimate bristles from motion that is small against their break-away deflection.
 
     The log has position and force; if it has gaps, the longest stretch is used. A joint must be held, or its deflection
-    measured.
+    measured. `between` describes what lies between the measured force and the bearing.
 
     The intervals include: the change with a lower low-pass and with the best-fitting delay (used if no delay is known);
     the uncertainty of the viscous friction subtracted from the damping; and the residual, because the model leaves out
@@ -139,7 +139,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
-    """Return a record low-passed and thinned to the needs of a cut-off [Hz] of the force."""
+    """Low-pass and thin a record, as a fit of the force below `cutoff` [Hz] needs it."""
     settings = ExperimentSettings.current()
     return record.seen(
         settings.low_pass_of_the_motion * cutoff,
@@ -148,7 +148,7 @@ def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
 
 
 def _nothing(why: str) -> Presliding:
-    """Return a result without estimates, with the reason."""
+    """Return a result without estimates, for the reason `why`."""
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
     none = np.empty(0)
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
@@ -177,16 +177,17 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
-    """Fit again with the mass from the first fit and, if `late`, with the best-fitting delay."""
+    """Fit twice, the second time with the mass and, if `late`, the delay that the first gives."""
     fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
-    """Fit the force at a low-pass by least squares, and search the bending, which is nonlinear.
+    """Fit the force below a low-pass frequency [Hz] by least squares.
 
-    `mass` [kg] is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
+    The bending of the bristles, which is nonlinear, is searched. `mass` [kg] is the assumed moving mass; if `late`, the
+    effect of a slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
@@ -225,10 +226,10 @@ def _apart(columns: np.ndarray, number: int) -> float:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The equation of a record of small motion at a low-pass.
+    """The equation of motion for a record of small motion, below one low-pass frequency.
 
-    It has the position [m] of the body on the bearing, shape (n,), and, low-passed, the force [N] and the columns that
-    do not depend on the bristles, shape (m,) each.
+    `body` is the position [m] of the body on the bearing, shape (n,). Low-passed, shape (m,) each, there are the force
+    [N] in `target` and the columns that do not depend on the bristles.
     """
 
     low_pass: LowPass
@@ -251,9 +252,9 @@ class _Equation:
 
 
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
-    """Set up the equation of a record.
+    """Set up the equation of motion of a record, with signals low-passed at `cutoff` [Hz].
 
-    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position: the part
+    A structural mode with the mass m and frequency w adds m/w^2 times the fourth derivative of the position. The part
     of this effect that `between` does not describe is among the fixed columns.
     """
     time, low_pass = record.time, LowPass(record.time, cutoff)
@@ -275,7 +276,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _at_most(total: Estimate) -> Estimate:
-    """Bound the damping of the bristles by the `total` with unknown viscous friction."""
+    """Return the damping of the bristles as at most `total`, which includes viscous friction."""
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"

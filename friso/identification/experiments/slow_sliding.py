@@ -82,12 +82,12 @@ class SlowSliding:
 
 @dataclass(frozen=True)
 class _Equation:
-    """The equation of a record of slow sliding at a low-pass.
+    """The equation of friction for a record of slow sliding, below one low-pass frequency.
 
-    It has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s], shape (n,);
-    low-passed, shape (m,), the friction [N] without the viscous part, and its change per second of delay. `sizes` are
-    the scales of the fitted numbers: Coulomb friction, excess of static friction, Stribeck velocity, constant force,
-    initial force of the bristles.
+    The record has the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
+    shape (n,). Low-passed, shape (m,), it has the friction [N] without the viscous part, and its change per second of
+    delay. `sizes` are the scales of the fitted numbers: Coulomb friction, excess of static friction, Stribeck velocity,
+    constant force, initial force of the bristles.
     """
 
     low_pass: LowPass
@@ -116,7 +116,7 @@ class _Equation:
         return self.model(p) - self.friction
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the residual, shape (m, 5)."""
+        """Return the derivatives of the residual by the fitted numbers, shape (m, 5)."""
         settings = ExperimentSettings.current()
         residuals_here = self.model(p)
         return np.stack(
@@ -180,7 +180,7 @@ def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _nothing(why: str) -> SlowSliding:
-    """Return a result without estimates, with the reason."""
+    """Return a result without estimates, for the reason `why`."""
     none = np.empty(0)
     return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
 
@@ -191,7 +191,10 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Return the scales of the fitted numbers: the mean force [N], and the RMS velocity [m/s]."""
+    """Return the scales of the five fitted numbers, in the order of `_Equation`.
+
+    Forces have the mean size of the force [N], the Stribeck velocity the RMS velocity [m/s].
+    """
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
@@ -199,7 +202,7 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
-    """Set up the equation of a record at a low-pass [Hz]."""
+    """Set up the equation of friction of a record, with signals low-passed at `cutoff` [Hz]."""
     settings = ExperimentSettings.current()
     seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])

@@ -36,14 +36,14 @@ class Wandering:
 
 @dataclass(frozen=True)
 class StandstillResult:
-    """Logs at standstill; all others are compared with the first."""
+    """Deviations in several logs at standstill; all others are compared with the first."""
 
     logs: tuple[Wandering, ...]
     warnings: tuple[str, ...] = ()
 
     @property
     def ratios(self) -> tuple[tuple[float, float], ...]:
-        """Return the ratios of RMS and peak of every log to the first log's; NaN if it stands."""
+        """Return the ratios of RMS and peak of every log to the first's; NaN where that is 0."""
         first = self.logs[0]
         pairs = ((log.rms / first.rms if first.rms else np.nan, log.peak, first.peak) for log in self.logs)
         return tuple((rms, peak / least if least else np.nan) for rms, peak, least in pairs)
@@ -77,7 +77,7 @@ def _estimates(result: StandstillResult, stage: Stage | None) -> tuple[Estimate,
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log without a force whose reference stands still."""
+    """Return why a log is of standstill, or None: its reference stands, and it has no force."""
     log = course.log
     if "reference" not in log or course.reference_moves or "force" in log:
         return None

@@ -102,7 +102,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
     """Find stretches of a segment at a constant position that are long enough to average.
 
-    The reference decides, or the position without one.
+    The reference decides what is constant; without a reference, the position does.
     """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:
@@ -172,10 +172,10 @@ def _drifting(values: np.ndarray) -> tuple[Mean, float]:
 
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
-    """Fit the differences of force over those of deflection by a line through the origin.
+    """Estimate the stiffness by a line through the origin: changes of force over deflection.
 
-    Neighbouring differences share a window, so the largest of three variances counts: for independent differences
-    (drifting force), for differences of independent windows (noise), and by the noise within windows.
+    Neighbouring changes share a window, so the largest of three variances counts: for independent changes (drifting
+    force), for changes of independent windows (noise), and by the noise within windows.
     """
     method = METHOD + words
     count = int(chosen.sum())
@@ -242,9 +242,9 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
 
 
 def _claims(course: Course) -> str | None:
-    """Claim a log without a moving reference whose position rests in several places.
+    """Return why a log holds position steps against a joint, or None.
 
-    The force at these places rises with the position.
+    The position of such a log rests in several places, where the force rises with the position. No reference moves.
     """
     if course.reference_moves or not course.against_a_spring:
         return None

@@ -145,7 +145,10 @@ def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
 def _pull(
     log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the low-passed force on the cart [N], and the relative error of its scale."""
+    """Return the low-passed force on the cart [N], and the relative error of its scale.
+
+    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`.
+    """
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises if missing
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
@@ -157,7 +160,7 @@ def _pull(
 
 
 def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
-    """Estimate the joint's stiffness from this log."""
+    """Estimate the joint's stiffness from force and deflection while the cart sticks (`loads`)."""
     pushed = _actuator(log, 0.0, cutoff)
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"

@@ -52,8 +52,8 @@ class LawPrediction:
 class LawComparison:
     """The friction laws, ranked by their prediction of logs, the best first.
 
-    `logs` are the names of the logs used, `left_out` names the others, each with the reason, and `parts` counts the
-    predicted parts. `unseen` tells whether fits started from the stage before any log.
+    `logs` are the names of the logs used, `left_out` has the reason for each other log by its name, and `parts` counts
+    the predicted parts. `unseen` tells whether fits started from the stage before any log.
     """
 
     predictions: tuple[LawPrediction, ...]
@@ -111,7 +111,8 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
     """Fit every law to the logs, and let each predict left-out parts.
 
     Fits start from the stage before any log (`prior`), or from the `stage` identified from all logs if no fit can start
-    from its law. Raises InputError if no log shows friction before sliding, and for a stage whose law has no stiction.
+    from its law. Raises InputError if no log shows friction, and for a stage whose law has no stiction or that has
+    friction at the motor too.
     """
     records, left_out = _records(logs, prior)
     if not records:

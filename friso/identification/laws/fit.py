@@ -146,7 +146,7 @@ class LawProblem:
         return starts
 
     def _pairs(self, used: Sequence[np.ndarray]) -> list[tuple[np.ndarray, DraggedRecord]]:
-        """Pair the masks with their records."""
+        """Pair the masks of used samples with their records."""
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:

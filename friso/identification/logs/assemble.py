@@ -83,7 +83,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
     """Return each role's channel at even instants in the unit of the role.
 
     A channel that was proposed by its name and is not `needed` is left out, with a warning, if it lacks instants or a
-    unit. For other channels raises LogError.
+    unit. Any other channel without them raises LogError.
     """
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
@@ -153,7 +153,7 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
     """Check that a log is long enough, and that signals that should change do.
 
-    Raises LogError.
+    Raises LogError if not, and for samples implausibly close or far apart.
     """
     settings = LogSettings.current()
     if base.time.size < settings.samples_of_a_log:

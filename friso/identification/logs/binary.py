@@ -46,7 +46,7 @@ def mat_tree(path: Path) -> dict[str, Any]:
 
 
 def _object(kind: str) -> dict[str, str]:
-    """Return the mark of an object whose content only MATLAB can read."""
+    """Return a placeholder for an object of class `kind` whose content only MATLAB can read."""
     return {OBJECT: kind}
 
 
@@ -130,7 +130,7 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """Return a MATLAB structure, or a structure array, whose fields are lists of references."""
+    """Return the fields of a MATLAB structure, or a list of structures if all hold references."""
     import h5py
 
     references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
@@ -237,7 +237,10 @@ def _end_with_parent() -> None:
 
 
 def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
-    """Read a file within limits of memory [B], processor time [s] and elapsed time [s]."""
+    """Read a file within limits of memory [B], processor time [s] and elapsed time [s].
+
+    The contents, or an error message, are written to standard output.
+    """
     faulthandler.dump_traceback_later(seconds, exit=True)  # this thread does not need the interpreter's lock
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if sys.platform != "win32":

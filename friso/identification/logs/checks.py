@@ -75,8 +75,8 @@ def rises_evenly(values: np.ndarray) -> bool:
 def clipped_share(values: np.ndarray) -> float:
     """Return the fraction of samples in flat tops, which show that a signal is clipped.
 
-    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it with a kink (the step before is
-    at least a fifth of the largest step), or hardly ever repeats a value elsewhere. A command that switches between two
+    A flat top lies at an extreme and has at least 3 equal samples. The signal enters it abruptly (the step before is at
+    least a fifth of the largest step), or hardly ever repeats a value elsewhere. A command that switches between two
     values is not clipped.
     """
     settings = LogSettings.current()

@@ -34,7 +34,7 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)  # recognising a format and reading the file ask for one content
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    """Read a file; the result is cached until the file changes."""
+    """Read a binary log in a separate process; the result is cached until the file changes."""
     settings = LogSettings.current()
     memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
     seconds = settings.time_of_reading + size / settings.speed_of_reading
@@ -83,7 +83,7 @@ class _PlainUnpickler(pickle.Unpickler):
     """Unpickler of plain types and NumPy arrays that refuses everything else."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """Return the parts of an array of numbers, and refuse everything else."""
+        """Return a class or function of which arrays consist, and refuse everything else."""
         if module.partition(".")[0] == "numpy" and name in ("ndarray", "dtype", "_reconstruct", "_frombuffer"):
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name}")

@@ -12,7 +12,7 @@ from friso.identification.logs.settings import LogSettings
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
     """Report the delay of the velocity [m/s] behind the derivative of position [m], "" for none.
 
-    Both are sampled every `period` [s].
+    Both signals are sampled every `period` [s]; the longest of `parts` is used.
     """
     part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
@@ -54,7 +54,10 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 
 
 def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
-    """Return the best-fitting lag; NaN if zero lag fits almost as well."""
+    """Return the lag [samples] with which causes explain an effect best; NaN if it is unclear.
+
+    The lag is unclear if a lag of 0 explains almost as much.
+    """
     settings = LogSettings.current()
     shares = _explained(effect, causes)
     none = 1 - shares[settings.longest_delay_samples]
@@ -62,7 +65,7 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
-    """Return the fraction of an effect that its causes explain at each lag of the search."""
+    """Return the fraction of an effect that its causes explain, for each lag of the search."""
     longest = LogSettings.current().longest_delay_samples
     middle = effect[longest:-longest] - effect[longest:-longest].mean()
     energy = middle @ middle
@@ -76,7 +79,10 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
 
 
 def _peak(heights: np.ndarray) -> float:
-    """Return the index of the peak, by a parabola through three values; NaN if it is unclear."""
+    """Return the lag [samples] of the highest value, by a parabola through three values.
+
+    `heights` are values over all lags of the search. NaN if the peak is low or at a border.
+    """
     i = int(np.argmax(heights))
     if heights[i] < 0.5 or i in (0, heights.size - 1):
         return np.nan

@@ -80,7 +80,7 @@ class GapsError(LogError):
 
 
 def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> list[MotionReading]:
-    """Find force and motion by mechanics among channels, where names leave these roles open.
+    """Find force and motion among channels by mechanics, where names leave these roles open.
 
     Returns the best reading, then others that explain the force about as well; [] if nothing is open, or if no reading
     explains the force.
@@ -92,7 +92,7 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
     taken = [choice.channel for choice in chosen.values()]
 
     def candidates(role: str) -> list[Channel]:
-        """List the candidates for a role: its channel, its rivals, or else the channels that fit."""
+        """List the channels that may have a role: its own, those competing for it, or all that fit."""
         if role in chosen:
             return [chosen[role].channel]
         every = rivals.get(role) or [channel for channel, _ in _fitting(role, table, taken)]
@@ -112,9 +112,10 @@ def told_by_mechanics(table: ChannelTable, proposal: Proposal, needed: Sequence[
 def check_gaps(
     reading: Reading, proposal: Proposal, needed: Sequence[str], readings: Sequence[MotionReading] = ()
 ) -> None:
-    """Check that a log can be read as one with the roles that are `needed`.
+    """Check that a log has every role in `needed`, with units and sample times.
 
-    `readings` are readings of its channels by mechanics. Raises GapsError with everything that is missing.
+    `readings` are pairs of channels that mechanics suggests as force and motion. Raises GapsError with everything that
+    is missing.
     """
     table, origin = reading.table, reading.origin
     named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
@@ -179,7 +180,7 @@ def _by_mechanics(
 
 
 def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: bool) -> list[LogError]:
-    """List missing units; if units or names tell that the axis turns, units of a rotary axis.
+    """List errors for missing units; if units or names imply a rotary axis, for that axis.
 
     A force that acts `against` the motion that it causes gets a negative scale as its example.
     """
@@ -219,9 +220,9 @@ def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> 
 
 
 def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
-    """Return the candidates for a role, with the quality of their fit, the best first.
+    """Return the channels that may have a role, each rated by how well it fits, the best first.
 
-    Candidates must have as many samples as most channels.
+    Channels with as many samples as most channels come first.
     """
     used = {id(channel) for channel in taken}
     usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
@@ -248,7 +249,7 @@ def _is_of_another(role: str, unit: str) -> bool:
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Choose the measured channel among channels that move alike, with the reason.
+    """Choose the measured channel among channels that move alike, and say why.
 
     The measured channel is the only one whose name says so, or the noisiest. The channel is None if that is unclear.
     """
@@ -307,7 +308,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
-    """List missing information on the sample times of channels."""
+    """List errors for missing sample times of channels."""
     if "time" in proposal.rivals:
         return []
     for choice in choices:

@@ -25,9 +25,9 @@ LENGTHS = ("m", "rad")
 def is_needed(
     table: ChannelTable, proposal: Proposal, needed: Sequence[str], best: MotionReading | None = None
 ) -> bool:
-    """Tell whether a needed position must be the integral of the velocity.
+    """Tell whether a needed position must be computed as the integral of the velocity.
 
-    It must be if no channel is or could be a position, if the user assigned a velocity and no position, or if the
+    This is so if no channel is or could be a position, if the user assigned a velocity and no position, or if the
     `best` reading by mechanics has a velocity.
     """
     velocity = proposal.chosen.get("velocity")

@@ -1,4 +1,4 @@
-"""Shared parts of readers that use optional libraries."""
+"""Shared parts of the readers that need optional libraries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from friso.platform.extras import install, is_installed
 
 
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
-    """Read a file of a kind by a library.
+    """Read the contents of a log in the format `kind`, which needs an optional library.
 
     Raises LogError, which says how to install a missing library.
     """

@@ -129,7 +129,7 @@ def from_options(
     """Make a mapping from the texts of options.
 
     The options are `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`, `--axis rotary`.
-    Raises LogError.
+    Raises LogError for a text in another form, or for an unknown role or axis.
     """
     roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
     channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
@@ -148,7 +148,7 @@ def _pair(
 ) -> tuple[str, str]:
     """Split a text at its first (or last) equals sign.
 
-    Raises LogError.
+    Raises LogError for a text without one, or with a left side that is not allowed.
     """
     first, sign, second = text.rpartition("=") if last else text.partition("=")
     first, second = first.strip(), second.strip().strip('"')
@@ -160,7 +160,7 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """Write the assumption behind an example, to be checked before copying the example."""
+    """Write a note that an example rests on a guess, to be checked before it is copied."""
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 
@@ -228,7 +228,7 @@ _KEPT = "a mapping kept by friso; delete the file to map again"
 def _parsed(place: Path) -> Mapping:
     """Read the mapping in a file.
 
-    Raises LogError.
+    Raises LogError for a file that is no mapping.
     """
     try:
         document = parsed(text_of(place, _KEPT), _KEPT)
@@ -256,9 +256,9 @@ def _parsed(place: Path) -> Mapping:
 
 
 def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
-    """Check a table of texts; the set-up may also have numbers and booleans.
+    """Check that a table of a mapping file holds texts, and return it.
 
-    Raises LogError.
+    The table [setup] may also have numbers and booleans, which become texts. Raises LogError for any other value.
     """
     if key == "setup":
         table = {name: as_toml(value) if isinstance(value, int | float) else value for name, value in table.items()}

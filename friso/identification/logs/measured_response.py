@@ -59,7 +59,7 @@ def is_response(names: Iterable[str]) -> bool:
 def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     """Build a frequency response from the columns of a table.
 
-    Raises LogError.
+    Raises LogError for columns that are missing, doubled, or of different lengths.
     """
     by_kind: dict[str, list[Channel]] = {}
     for channel in table.channels:
@@ -140,9 +140,9 @@ def response_unit(text: str) -> tuple[float, str, str]:
 
 
 def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
-    """Check a response, and return it without its line at 0 Hz.
+    """Check a response; return it as a response of position, without lines at 0 Hz or below.
 
-    Raises LogError for too few or falling frequencies and NaN.
+    Raises LogError for too few or falling frequencies, for NaN, and for a force over a motion.
     """
     positive = measured.frequency > 0
     if not positive.all():

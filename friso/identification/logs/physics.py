@@ -103,9 +103,9 @@ def is_counter(channel: Channel) -> bool:
 
 
 def leads(one: Channel, other: Channel) -> bool:
-    """Tell whether a channel leads another with a similar motion, as a reference does.
+    """Tell whether a channel runs ahead of another with a similar motion, as a reference does.
 
-    Their velocities correlate best if the other is shifted back by a sample or more, up to a tenth of the record.
+    The velocities of both correlate best if the other is shifted back by a sample or more, up to a tenth of the record.
     """
     signals = [_filled(one), _filled(other)]
     size = len(one.values)

@@ -64,7 +64,7 @@ def file_format(path: Path) -> str:
 def read_table(path: Path | str) -> ChannelTable:
     """Read the channels of a log of any format.
 
-    Raises LogError.
+    Raises LogError for a file of unknown format, or one that its format cannot read.
     """
     path = Path(path)
     return FORMATS[file_format(path)].read(path)
@@ -73,7 +73,7 @@ def read_table(path: Path | str) -> ChannelTable:
 def is_frequency_response(path: Path | str) -> bool:
     """Tell whether a file has a frequency response instead of signals over time.
 
-    Raises LogError as `file_format`.
+    Raises LogError for a file that cannot be opened or has no known format.
     """
     path = Path(path)
     return FORMATS[file_format(path)].holds_response(path)
@@ -82,7 +82,7 @@ def is_frequency_response(path: Path | str) -> bool:
 def read_frequency_response(path: Path | str) -> MeasuredResponse:
     """Read the frequency response in a file.
 
-    Raises LogError.
+    Raises LogError for a file that holds none.
     """
     path = Path(path)
     form = FORMATS[file_format(path)]

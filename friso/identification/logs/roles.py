@@ -60,7 +60,10 @@ Istposition, Lagesollwert, Motorstrom."""
 
 @dataclass(frozen=True)
 class AssignedRole:
-    """A channel for a role with the reason; `by_user` if the user assigned it."""
+    """A log channel that was assigned a role, such as position or force, and the reason.
+
+    `by_user` is true if the user assigned it.
+    """
 
     role: str
     channel: Channel
@@ -190,7 +193,10 @@ def listing(table: ChannelTable, taken: Sequence[Channel] = ()) -> str:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Roles with their channels, and `rivals` where several channels could have a role."""
+    """Channels that are `chosen` for roles such as position, and those that compete for a role.
+
+    `rivals` has the competing channels by role.
+    """
 
     chosen: dict[str, AssignedRole]
     rivals: dict[str, tuple[Channel, ...]]
@@ -200,7 +206,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
     """Give roles to channels: as the user assigned them, then by names, then by units.
 
     Of several channels whose names imply a role, the channel whose name has no other word gets it. Raises LogError for
-    an assigned channel that does not exist.
+    an assigned channel that does not exist, or that is assigned to two roles.
     """
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
@@ -261,12 +267,12 @@ def is_clock(channel: Channel) -> bool:
 
 
 def of_no_signal(name: str) -> bool:
-    """Tell whether a name says that a channel is an error, a limit, a counter or the like."""
+    """Tell whether a name says that a channel is no signal: an error, a limit, a counter."""
     return bool({*words(name)} & _NOT_MEASURED)
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Return the only candidate whose name is exactly the role or its word, or None."""
+    """Return the only candidate whose name is exactly the role, or the word for it; else None."""
     if len(matches) < 2:
         return None
     for alone in (

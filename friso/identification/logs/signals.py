@@ -46,7 +46,7 @@ class Reading:
     """Rules for reading channels: the table, the user's mapping, and the accepted units.
 
     With `strict`, only units that convert to the roles' are accepted, except for `foreign` roles (a force in volts).
-    `bare` tells that the file's format has no units; `origin` is the path.
+    `bare` is true if the file's format has no units; `origin` is the path.
     """
 
     table: ChannelTable
@@ -61,14 +61,15 @@ class Reading:
         return self.mapping.axis_kind.unit(ROLES[role])
 
     def takes(self, role: str, si: str) -> bool:
-        """Tell whether a signal of a role may have a unit that is not the role's."""
+        """Tell whether a signal of a role may stay in the unit `si`."""
         return si == self.unit(role) or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
     """Return the table with the user's units, and with times derived from time columns.
 
-    Times are derived if the format has no `times` of its own. Raises LogError.
+    Times are derived if the format has no `times` of its own. Raises LogError for an unknown unit, or for a channel
+    that the table lacks.
     """
     if not mapping.units:
         return table
@@ -89,7 +90,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     """Return the values of a channel in the unit of its role, and add notes on the conversion.
 
-    Raises LogError.
+    Raises LogError for a unit that does not fit, and for values that no instrument measures.
     """
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoder counters overflow
@@ -128,7 +129,10 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
 
 
 def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, str]:
-    """Return the factor of a scale, and the unit of the scaled values."""
+    """Return the factor of a scale to SI, and the unit that the channel has or must have for it.
+
+    Raises LogError for a scale that does not fit.
+    """
     try:
         return read_scale(role, scale, unit, reading.mapping.axis_kind)
     except InputError as error:
@@ -152,7 +156,7 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
     """Tell whether a channel without a unit is taken as SI.
 
-    It is if the user assigned it, the format has no units, and it is no current in place of a force.
+    This is so if the user assigned it, the format has no units, and it is no current or voltage in place of a force.
     """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)
@@ -229,7 +233,7 @@ def _span(values: np.ndarray) -> str:
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
     """Return the instants of a channel [s]; None if nothing states them.
 
-    Raises LogError.
+    Raises LogError for a time column in an unusable unit.
     """
     channel = choice.channel
     if reading.mapping.sample_time is not None:
@@ -246,7 +250,7 @@ def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading,
 def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
     """Return how many seconds the unit of the time channel has.
 
-    Raises LogError for none.
+    Raises LogError for a channel without a unit of time.
     """
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.by_user and reading.bare:
@@ -311,7 +315,7 @@ def _offers(table: ChannelTable) -> str:
 def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
     """Check that every scale is for a role that has a channel.
 
-    Raises LogError.
+    Raises LogError for a scale without one.
     """
     for role in mapping.scales:
         if role not in chosen:

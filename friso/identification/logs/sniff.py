@@ -38,7 +38,8 @@ class TextLayout:
     """Layout of a text.
 
     `first` is the number of lines before the numbers, and `above` has these lines; `names` and `units` are per column.
-    With `exact` every delimiter ends a cell, so that several spaces are empty cells.
+    `certain` is true if the text shows its decimal sign. With `exact` every delimiter ends a cell, so that several
+    spaces are empty cells.
     """
 
     encoding: str
@@ -180,7 +181,7 @@ def _best_fit(encoding: str, lines: Sequence[str]) -> TextLayout | None:
 def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
     """Check that every quotation mark in a heading is closed.
 
-    Otherwise all cells after it would be read as one. Raises LogError.
+    Raises LogError for an open one, because all cells after it would be read as one.
     """
     number, heading = next(((n, line) for n, line in reversed([*enumerate(above, 1)]) if line.strip()), (0, ""))
     with suppress(csv.Error):

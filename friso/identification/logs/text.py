@@ -72,7 +72,7 @@ def read_frame(path: Path, form: TextLayout) -> Any:
     """Read all cells from the first row of numbers on; columns without text are floats.
 
     Lines before the table are skipped here, because pandas would take a lone quotation mark in them as opening. Raises
-    LogError.
+    LogError for ragged rows.
     """
     options: dict[str, Any] = {
         "header": None, "decimal": form.decimal,
@@ -99,11 +99,11 @@ class _WithoutDosEnd:
     """A text file without the end mark of DOS programs."""
 
     def __init__(self, file: TextIO) -> None:
-        """Wrap a text file."""
+        """Wrap a text file, from whose text the mark is removed."""
         self._file = file
 
     def read(self, size: int = -1) -> str:
-        """Read so many characters, without the mark."""
+        """Read `size` characters (-1: all), without the mark."""
         return self._file.read(size).replace(DOS_END, "")
 
     def __iter__(self) -> Iterator[str]:
@@ -128,9 +128,9 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
 
 
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
-    """Check that no row lacks cells in complete columns.
+    """Check that no row lacks its last cells while later rows have them.
 
-    Raises LogError.
+    Raises LogError, with the line, if one does.
     """
     present = frame.iloc[:, -1].notna().to_numpy()
     missing = np.flatnonzero(~present[: int(np.flatnonzero(present)[-1])]) if present.any() else np.empty(0, dtype=int)

@@ -109,7 +109,7 @@ def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return the samples that are numbers, and how many samples between them are not.
 
-    Raises LogError.
+    Raises LogError if fewer than half of the samples are numbers.
     """
     finite = np.isfinite(time) & np.isfinite(values)
     if finite.size < 2:
@@ -122,10 +122,10 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """Put a track on even instants.
+    """Give a channel even instants in each segment.
 
-    Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the track is
-    interpolated, with a note.
+    Stamps are replaced by even ones if they scatter little, or only by their resolution; otherwise the values are
+    interpolated, with a warning.
     """
     settings = LogSettings.current()
     order, about = np.empty_like(raw.time), np.empty_like(raw.time)

@@ -194,7 +194,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
     """Return the factor of a scale such as "35.1507 N/V", and the unit assumed for the channel.
 
     The factor leads to the SI unit of the role on that axis. A channel without a unit gets the unit after the scale's
-    stroke. Raises LogError.
+    stroke. Raises LogError for units that do not fit role and channel.
     """
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
     role_unit = axis.unit(ROLES[role])
@@ -222,7 +222,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
 def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
     """Return the SI value of a scale's part above the stroke.
 
-    Raises LogError.
+    Raises LogError for a part in another unit than `role_unit`.
     """
     try:
         return float(Quantity(role_unit, any_sign, "").read(text))

@@ -13,7 +13,7 @@ from friso.identification.readings.common import turns_of
 
 @dataclass(frozen=True)
 class Coverage:
-    """Steady speeds and starts of motion that a record contains, by which parameters can show.
+    """Steady speeds and starts of motion in a record; they decide what a fit can show.
 
     `steady` has speeds of steady motion [m/s], ascending, one per stretch. `starts` has, for each stretch between
     turning points, the distances [m] covered at its samples, NaN where inertia outweighed friction. `resolution` [m] is

@@ -1,4 +1,4 @@
-"""Draw machines, as fitted numbers, from the ranges that a record leaves open."""
+"""Sample machines at random from what a record leaves open."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from friso.intervals import COVERAGE
 def drawn_from(
     estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
 ) -> np.ndarray:
-    """Draw machines from the ranges that a record leaves open, as rows of fitted numbers.
+    """Sample machines at random from what a record leaves open, as rows of fitted numbers.
 
-    The result has the shape (draws, parameters). `inner`, shape (parameters,), has the numbers of the fit. Determined
-    quantities are drawn by their intervals and `correlation`. Quantities with a range only are uniform in it, or in its
-    logarithm; a parameter without an estimate is drawn from its whole range of the fit.
+    A fitted number is a parameter's value or its logarithm. The result has the shape (machines, parameters). `inner`,
+    shape (parameters,), has the numbers of the fit. Quantities with a value are sampled by their intervals and
+    `correlation`. Quantities with a range only are uniform in it, or in its logarithm; a parameter without an estimate
+    is sampled from its whole range of the fit.
     """
     settings = OutputErrorSettings.current()
     rng = np.random.default_rng(settings.seed_of_draws)
@@ -45,7 +46,7 @@ def drawn_from(
 
 
 def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
-    """Draw values evenly from the whole range of a parameter, shape (draws,)."""
+    """Sample values evenly from the whole range of a parameter, shape (machines,)."""
     settings = OutputErrorSettings.current()
     return parameter.outer(
         rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
@@ -53,7 +54,7 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Compute a fit parameter of drawn machines from stage-file keys; None if keys are missing."""
+    """Compute a fit parameter of sampled machines from their keys; None if keys are missing."""
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

@@ -16,11 +16,11 @@ from friso.intervals import COVERAGE
 
 @dataclass(frozen=True)
 class ExplainedResidual:
-    """Effect of forces that the model leaves out on the residual of a fit.
+    """What additional forces, which the model leaves out, explain of a fit's residual.
 
-    `moved` is the shift of the fitted numbers, shape (free,); `sizes` are the fitted sizes of the effects; `left` is
-    the fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining residual, and `slopes`
-    its derivatives to numbers and sizes.
+    `moved` is the shift of the fitted numbers, shape (free,); `sizes` are the fitted sizes of the forces; `left` is the
+    fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining residual, and `slopes` its
+    derivatives by numbers and sizes.
     """
 
     moved: np.ndarray
@@ -30,7 +30,7 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last size differs from 0 by more than its correlated errors.
+        """Tell whether the size of the last force differs from 0 by more than its correlated errors.
 
         Errors repeat at every reversal: for a slow sine, a coupling or a delay then looks like slightly different
         friction.
@@ -45,7 +45,7 @@ class ExplainedResidual:
 def explained_by_forces(
     fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float], searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit additional forces to the residual of a fit, and let the fitted numbers change along.
+    """Fit additional forces to the residual of a fit, while its parameters may change, too.
 
     Each force [N], shape (n,), has size 1; it is simulated at its size in `units`, small enough to be linear. Returns
     None if the forces explain no more than the best of `searched` random ones.
@@ -57,10 +57,11 @@ def explained_by_forces(
 def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray, searched: int = 1
 ) -> ExplainedResidual | None:
-    """Fit a residual, shape (n,), by changes of the fitted numbers and by additional effects.
+    """Explain a residual, shape (n,), by changes of the fitted numbers and additional effects.
 
-    Derivatives have the shape (n, numbers), effects and weights `counted` the shape (n,). A number without effect, or
-    with infinite derivatives, does not move. Returns None if the effects clearly explain nothing.
+    `slopes` are the derivatives by the numbers, (n, numbers); `effects` and the weights `counted` have the shape (n,).
+    A number without effect, or with infinite derivatives, does not move. Returns None if the effects explain no more
+    than the best of `searched` random ones.
     """
     settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])
@@ -81,7 +82,10 @@ def explained_by(
 
 
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
-    """Tell whether the last additional force is sure if all model parameters may change."""
+    """Tell whether the last force is needed even if all parameters of the model may change.
+
+    `units` are the sizes [N] at which the forces are simulated.
+    """
     rest, slopes = beside_all_numbers(fit)
     explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
     return explained is not None and explained.is_sure(fit)

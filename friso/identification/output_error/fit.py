@@ -61,7 +61,7 @@ class OutputErrorFit:
 
     @property
     def bounded(self) -> set[int]:
-        """Return the free numbers whose intervals are narrow enough to be reported."""
+        """Return the indices of fitted numbers whose intervals are narrow enough to be reported."""
         settings, bounded = OutputErrorSettings.current(), set()
         for number, deviation in zip(self.free, self.deviation, strict=True):
             parameter = self.problem.parameters[number]
@@ -83,14 +83,14 @@ class OutputErrorFit:
 
     @property
     def stage(self) -> dict[str, Any]:
-        """Return the stage of the fit as flat keys."""
+        """Return the fitted stage as flat keys such as friction.static, with SI values."""
         parameters = zip(self.problem.parameters, self.inner, strict=True)
         values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
     @property
     def deviation(self) -> np.ndarray:
-        """Standard deviations of the fitted numbers, shape (free,)."""
+        """Return the standard deviations of the fitted numbers, shape (free,)."""
         return np.sqrt(np.diag(self.covariance))
 
     def with_deviations(self, wanted: np.ndarray) -> OutputErrorFit:
@@ -107,7 +107,7 @@ class OutputErrorFit:
 
     @cached_property
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
-        """Residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
+        """Return the residual, (n,), and its derivatives by the fitted numbers, (n, free)."""
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
 
@@ -123,7 +123,7 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
 
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
-    """Fit the free parameters of a problem, given by number, from several starts.
+    """Fit the `free` parameters of a problem, given by index, from several starts.
 
     The starts have the shape (starts, parameters). All are simulated, and the best of them refined. Parameters that are
     not free stay as in the first start.
@@ -149,7 +149,7 @@ def fits(
 def _fit(
     problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray, progress: Progress
 ) -> OutputErrorFit:
-    """Refine the best starts in rounds that keep fewer and fewer, and finish the last start.
+    """Refine the best starts in rounds that keep fewer and fewer, and finish the best one.
 
     The quality of a start shows after a few iterations, on pieces of a long record: for a stage that sticks and slips
     the best starts often lead to worse optima.
@@ -174,8 +174,8 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     """Spread many starts over the ranges of the free parameters, beginning with `first`.
 
     The result has the shape (starts, parameters). Wide starts are needed for parameters that only some motions show.
-    Core parameters start near the inverse model's values, because a first fit of them alone to stick-slip motion can
-    end anywhere.
+    Parameters that any motion shows start near the inverse model's values, because a first fit of them alone to
+    stick-slip motion can end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
@@ -195,7 +195,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
 
 
 def nearby(fit: OutputErrorFit) -> np.ndarray:
-    """Draw starts around the fit of another problem; the first start is the fit itself.
+    """Sample starts around the fit of another problem; the first start is the fit itself.
 
     The result has the shape (starts, parameters). Starts spread several times as wide as the fit's covariance, because
     the closed loop of a hunting stage has other optima.

@@ -25,11 +25,11 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 
 
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
-    """Choose whether the force of a log is held between its samples or interpolated linearly.
+    """Fit the force of a log as held and as interpolated between samples; return the better fit.
 
-    The choices differ by half a sample, which shifts bristle damping by half a sample times the bristle stiffness. The
-    worse choice is dropped if the better explains the record to the `noise` [N] of its force, and the worse clearly
-    less.
+    Both differ by half a sample, which shifts bristle damping by half a sample times the bristle stiffness. If the
+    better fit explains the force to its `noise` [N], and the worse fits clearly worse, the worse is ruled out.
+    Otherwise both stay possible, and intervals allow for both.
     """
     settings = OutputErrorSettings.current()
     problem = fit.problem

@@ -22,12 +22,14 @@ from friso.identification.readings.common import low_pass
 from friso.progress import Progress, between, silent
 
 PLAIN, LOOP, ALONG, AGAIN_LOOP = 0.1, 0.4, 0.85, 0.95
-"""Progress of the whole fit at the ends of its steps: mass and sliding friction; all parameters in closed loop; all
-parameters along the log; the closed loop started from the fit along the log. Uncertainties are the last step."""
+"""Fractions of the whole fit that are done after its steps: mass and sliding friction; all parameters in closed loop;
+all parameters along the log; the closed loop from the fit along the log. Uncertainties are the last step.
+"""
 
 FITTED, SETTLED, PROFILED = 0.5, 0.65, 0.95
-"""Progress of the fit along the log at the ends of its steps: all parameters; the motion between samples; profiles. The
-last step refits the determined parameters."""
+"""Fractions of the fit along the log that are done after its steps: all parameters; motion between samples; profiles.
+The last step refits the determined parameters.
+"""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class IdentifiableFit:
     """A fit, and the names of the parameters that the record determines.
 
     `profiles` has, by name, the profiles of parameters that not every motion shows, and `shown` the names of the
-    determined ones. `refuted` are parameters that something else in the record contradicts, with the reason.
+    determined ones. `refuted` has the reason for each parameter that something else in the record contradicts.
     """
 
     fit: OutputErrorFit
@@ -125,10 +127,11 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """Profile parameters that not every motion shows, and decide which of them to report.
+    """Refit all others for several values of each uncertain parameter; decide which to report.
 
-    If the fit has `explained` the record, a sharp profile suffices. Otherwise the motion must also cover the
-    parameter's effect, and only such parameters are profiled. A clearly better fit found in a profile replaces `full`.
+    Uncertain parameters are those that not every motion shows: all but the `core`. If the fit has `explained` the
+    record, a sharp interval from these refits suffices. Otherwise the motion must also cover the parameter's effect,
+    and only such parameters are examined. A clearly better fit among the refits replaces `full`.
     """
     names = full.problem.names
     profiles: dict[str, Profile] = {}
@@ -188,7 +191,7 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve if only one of its parameters is determined."""
+    """Drop the Stribeck curve unless its height and its velocity are both determined."""
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 

@@ -28,8 +28,8 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 class FitParameter:
     """A parameter of the fit with its SI unit, start value and range.
 
-    The logarithm of a `logarithmic` parameter is fitted. Any motion shows a `core` parameter; all others are examined
-    one by one.
+    The fitted number is the logarithm of a `logarithmic` parameter, otherwise its value. Any motion shows a `core`
+    parameter; all others are examined one by one.
     """
 
     name: str
@@ -75,7 +75,7 @@ def stribeck_up_to(flat: Mapping[str, Any]) -> float:
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
-    """Tell whether a stage, given by flat keys, has a joint that moves freely."""
+    """Tell whether a stage, given by keys such as joint.locked, has a joint that moves freely."""
     return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
@@ -86,8 +86,9 @@ def fit_parameters(
 
     `levels` has first values of mass, Coulomb and viscous friction and offset, from the inverse model. `speed` [m/s] is
     the highest in the log, and `travel` [m] its range: bristles bend no further, and the Stribeck velocity is no higher
-    unless bearings typically have higher ones. If the log does not go `both_ways`, a constant force and an asymmetry
-    cannot be distinguished from friction, and are left out. Raises InputError for a friction law that cannot be fitted.
+    unless bearings typically have higher ones. If the log does not go `both_ways`, a constant force and friction that
+    differs by direction cannot be separated from friction, and are left out. Raises InputError for a friction law that
+    cannot be fitted.
     """
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
@@ -115,7 +116,10 @@ def fit_parameters(
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
-    """List the fit parameters of the friction law; arguments are those of `fit_parameters`."""
+    """List the parameters of the friction law that a log may determine, with starts and ranges.
+
+    `levels` has first values from the inverse model; `speed` [m/s] and `travel` [m] are the largest in the log.
+    """
     settings = OutputErrorSettings.current()
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
@@ -160,7 +164,7 @@ def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float
 
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
-    """Turn fitted numbers, shape (runs, parameters), into stages as flat keys."""
+    """Turn fitted numbers, shape (runs, parameters), into stages as flat keys with SI values."""
     values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 

@@ -78,7 +78,7 @@ class Problem:
 
     @property
     def kernel(self) -> Kernel:
-        """The compiled equations of the stage."""
+        """Return the compiled equations of the stage."""
         return kernel(self.form)
 
     def noise_left(self, noise: float) -> float:
@@ -135,7 +135,7 @@ class Problem:
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         """Return target minus simulated force [N], shape (runs, n).
 
-        It is 0 at samples that do not count, and infinite for runs that failed.
+        Residuals are 0 at samples that do not count, and infinite for runs that failed.
         """
         residuals = np.empty((len(inner), len(self.target)))
         for numbers, record in self.simulated(inner):
@@ -212,7 +212,10 @@ class Problem:
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
-        """Compute the force [N] of a continuous-time controller from states at the samples."""
+        """Compute the force [N] of the controller from the states at the samples, shape (runs, n).
+
+        The stage's own controller counts in a closed loop, otherwise the guiding controller.
+        """
         count = runs.states.shape[1]
         if not self.closed:
             return self._holding_force(runs)

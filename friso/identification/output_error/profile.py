@@ -35,10 +35,11 @@ class Profile:
 
 
 def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
-    """Profile parameter `number`, with the `others` fitted at each of its values.
+    """Compute the cost of a fit over values of one parameter, with others refitted at each.
 
-    `best` is the mean square [N^2] of the fit that others are compared with. The values reach beyond the interval's
-    ends, or over the whole range. Returns the profile and the fits behind it.
+    The parameter has the index `number`, and `others` are the indices to refit. `best` is the mean square [N^2] of the
+    fit with which costs are compared. The values reach beyond the interval's ends, or over the whole range. Returns the
+    profile and the fits behind it.
     """
     settings = OutputErrorSettings.current()
     low, high = (float(end[number]) for end in bounds_of(fit.problem))

@@ -98,7 +98,7 @@ def refine_fit(
 def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return J' J and J' r of each row of numbers, from Jacobian J and residual r.
 
-    They are 0 for numbers that are not `free`.
+    Entries are 0 for numbers that are not `free`.
     """
     count = inner.shape[1]
     squares, gradients = np.zeros((len(inner), count, count)), np.zeros((len(inner), count))

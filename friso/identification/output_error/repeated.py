@@ -94,7 +94,7 @@ def _simulated_logs(
 
 
 def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random.Generator) -> np.ndarray:
-    """Draw errors of rounding [N], (n,), of a force that was logged in coarse digits [N].
+    """Sample errors of rounding [N], (n,), of a force that was logged in coarse digits [N].
 
     Forces at one level and one `speed` [m/s] are rounded alike, in both directions, so that errors last as long as a
     motion is steady and do not average out as noise does. Rounding the force of the fit again would not show them: its

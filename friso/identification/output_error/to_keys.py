@@ -66,7 +66,7 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Turn deviations of logarithms into deviations of values that reach the interval's upper end.
+    """Widen deviations to the upper end of intervals that are symmetric in the logarithm.
 
     An interval of half a value each way in the logarithm reaches 0.65 of the value above and 0.4 below.
     """
@@ -136,11 +136,9 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """Return the range [SI] of an undetermined parameter that is plausible for any bearing.
+    """Return the range [SI] that any bearing may have of a parameter that is not determined.
 
-    `owner` is the parameter's name.
-
-    The fitted value is no bound, because it compensates for what the model lacks.
+    `owner` is the parameter's name. The fitted value is no bound, because it compensates for what the model lacks.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]

@@ -88,7 +88,8 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 def believed_between(prior: Prior, log: Log) -> Between:
     """Return the elements between force and bearing, from other experiments or the stage file.
 
-    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError.
+    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError for a [setup] that the
+    stage does not take.
     """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
@@ -124,9 +125,9 @@ class BearingRecord:
         return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
 
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
-        """Return the record low-passed at a frequency [Hz], from its start, and thinned.
+        """Return the record low-passed at `cutoff` [Hz] and thinned, with positions from its start.
 
-        Every `step`th sample is kept.
+        Every `step`th sample is kept. Without thinning, the force stays unfiltered.
         """
         place = low_pass(self.position, self.interval, cutoff)
         bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
@@ -164,7 +165,7 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Return why a record is not usable (too few samples or no force); "" if it is usable."""
+    """Return why a record cannot be used, such as too few samples or no force; "" if it can."""
     settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"

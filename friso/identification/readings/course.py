@@ -19,10 +19,10 @@ from friso.identification.response.period import find_periods
 
 @dataclass(frozen=True)
 class Repetition:
-    """Periodic repetition in a log.
+    """How a signal in a log repeats.
 
-    A period has `samples` samples, about so many `harmonics`, and turns of direction; the position rests for a fraction
-    of the time.
+    A period has `samples` samples, effectively `harmonics` harmonics, and `turns` changes of direction. The position
+    rests for the fraction `rests` of the time.
     """
 
     samples: int
@@ -33,7 +33,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class Course:
-    """Course of a log without a stated kind of experiment."""
+    """What a log shows of its motion, from which its kind of experiment is recognised."""
 
     log: Log
 
@@ -130,7 +130,7 @@ class Course:
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Tell whether the position rests at several places, each with its own force."""
+        """Tell whether the position rests at several places, and the force rises with the place."""
         settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
@@ -152,7 +152,7 @@ class Course:
 
     @property
     def words(self) -> str:
-        """Return the course of the log in words."""
+        """Describe in words what repeats in the log, and how."""
         repetition = self.repetition
         if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"

@@ -140,7 +140,7 @@ def _map(
 
 
 def _length(fields: np.ndarray) -> np.ndarray:
-    """Return the lag at which the autocorrelation of each field falls to 1/e, shape (fields,).
+    """Return the lag at which the autocorrelation of each row falls to 1/e, shape (rows,).
 
     The lag is a number of places, NaN if the autocorrelation does not fall that far.
     """
@@ -158,8 +158,9 @@ def _length(fields: np.ndarray) -> np.ndarray:
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Estimate the correlation length of the force along the rail.
 
-    Over the correlation length the autocorrelation falls to 1/e. The interval follows from the ratio of estimated to
-    true length in simulated random fields with exponential correlation, detrended likewise.
+    `flat` is the force without its trend, `step` [m] the distance of places. Over the correlation length the
+    autocorrelation falls to 1/e. The interval follows from the ratio of estimated to true length in simulated random
+    fields with exponential correlation, detrended likewise.
     """
     settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
@@ -207,7 +208,7 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 
 def _no_repeatability(reason: str) -> Estimate:
-    """Return an undetermined repeatability, with the reason."""
+    """Return an undetermined repeatability; the estimate states the `reason`."""
     return Estimate.unknown(
         "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
@@ -247,7 +248,7 @@ def _from_to(values: list[float]) -> str:
 
 
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
-    """Tell whether the force is the friction of the rail, with a sentence."""
+    """Tell whether the force is the friction of the rail, and say in a sentence why or why not."""
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:

@@ -40,8 +40,8 @@ class Direction:
 class FrictionVelocity:
     """Friction over speed, in both directions, with its data.
 
-    `forward` and `backward` include the constant force in their Coulomb friction; `both` excludes it, and `bias` [N] is
-    the constant force on the body as in the stage file.
+    The `directions` "forward" and "backward" include the constant force in their Coulomb friction; `both` excludes it,
+    and `bias` [N] is the constant force on the body as in the stage file.
 
     Per steady stretch, shape (n,), there are the velocity [m/s], and the mean force [N] without inertia with the
     half-width of its 95 % interval [N]. `unsteady`, shape (m,), has the velocities of unsteady stretches; `places` [m]
@@ -62,7 +62,7 @@ class FrictionVelocity:
 def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
     """Read friction over speed from stretches of constant velocity, over their common places.
 
-    All places are used if the common ones are too few. Inertia, `mass` [kg] times remaining acceleration, is
+    Stretches stay whole if their common places are too few. Inertia, `mass` [kg] times remaining acceleration, is
     subtracted. The Stribeck curve has the `exponent` of the stage unless the forces refute it; otherwise all intervals
     allow for every exponent that the forces permit. Quantities that the speeds cannot show are unknown, with the
     reason. Raises InputError for missing channels.
@@ -162,10 +162,11 @@ def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple
 def _covariance(
     inverse: np.ndarray, deviations: np.ndarray, scatter: float, errors: np.ndarray, levels: list[int]
 ) -> np.ndarray:
-    """Return the covariance of a solution, by the `inverse` of its design.
+    """Return the covariance (p, p) of a weighted least-squares solution.
 
-    `scatter` is the residual's variance relative to the `deviations` [N], used if above 1; `levels` are the columns for
-    levels of friction.
+    `inverse` (p, n) leads from the forces to the solution. `scatter` is the residual's variance relative to the
+    `deviations` [N], used if above 1; `levels` are the columns for levels of friction, whose error does not average
+    out.
     """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
@@ -174,12 +175,15 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Return the standard deviation [N] common to all friction levels, from half-widths [N]."""
+    """Return the standard deviation [N] that all forces share, from their half-widths [N].
+
+    Forces share it because they were read over the same places.
+    """
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
 
 def _nothing(reason: str) -> Direction:
-    """Return undetermined friction for a direction, with the reason."""
+    """Return undetermined friction for a direction; each estimate states the `reason`."""
     units = {"coulomb": "N", "viscous": "N s/m", "static": "N", "stribeck_velocity": "m/s", "stribeck_exponent": ""}
     unknown = (Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in units.items())
     coulomb, viscous, static, velocity, exponent = unknown

@@ -107,9 +107,9 @@ def _of_reference(log: Log, part: slice) -> list[slice]:
 
 
 def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
-    """Find where the body itself keeps its velocity.
+    """Find the stretches over which the body itself keeps its velocity.
 
-    Its acceleration is within the noise there, or small compared with the largest acceleration and with its velocity. A
+    The acceleration is within the noise there, or small compared with the largest acceleration and with the velocity. A
     stretch that swings throughout counts as well.
     """
     settings = ReadingSettings.current()

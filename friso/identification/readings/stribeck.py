@@ -1,9 +1,9 @@
 """Fit a Stribeck curve to friction at constant speeds, with profile intervals.
 
-At a given Stribeck velocity and exponent the curve is linear in all other parameters: least squares are computed over a
-grid of both, and an interval contains every value that explains the forces within chance, for any exponent (profile
-likelihood). A linearised interval at the best fit is much too narrow, because another exponent with another velocity
-may fit as well.
+At a given Stribeck velocity and exponent the curve is linear in all other parameters. Least squares are therefore
+computed over a grid of both, and an interval contains every value that explains the forces within chance, for any
+exponent (profile likelihood). A linearised interval at the best fit is much too narrow, because another exponent with
+another velocity may fit as well.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class FittedStribeck:
 class Forces:
     """Friction [N] against the motion at speeds [m/s], shape (n,), to which a curve is fitted.
 
-    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. Both
-    directions may share one curve and a constant force.
+    `directions` are 1 or -1; `deviations` [N] weigh each force, and `level` [N] is a deviation common to all. `both` is
+    true if both directions share one curve and a constant force.
     """
 
     speeds: np.ndarray
@@ -107,7 +107,8 @@ def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> Fitted
 def _better(plain: float, least: float, more: int, left: int) -> bool:
     """Tell whether a curve fits significantly better than a line with fewer parameters (F-test).
 
-    It has `more` parameters than the line, and leaves `left` degrees of freedom.
+    `plain` and `least` are the sums of squares of line and curve. The curve has `more` parameters than the line, and
+    leaves `left` degrees of freedom.
     """
     settings = ReadingSettings.current()
     return least < plain and (
@@ -166,9 +167,10 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """Return the margin of each grid point to the cost limit of the possible region.
+        """Return how far the cost of each grid point is below the limit of the possible region.
 
-        `left` is the number of degrees of freedom.
+        The result has the shape (velocities, exponents), and is negative outside. `left` is the number of degrees of
+        freedom.
         """
         least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
         least = np.where(np.isfinite(least), least, 0.0)

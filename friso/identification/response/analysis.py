@@ -1,4 +1,4 @@
-"""Analyse the frequency responses of one bench: lines, modes, two masses, and the effect of friction."""
+"""Analyse frequency responses of one machine: lines, modes, two masses, effect of friction."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ FrequencyRange = tuple[float, float]
 
 @dataclass(frozen=True)
 class Bench:
-    """Results from the frequency responses of one bench.
+    """Results from the frequency responses of one machine.
 
     `driven` and `other` are the responses from force to position of the driven mass and, if measured, of the other
     mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. `departs`, `drag` and `explanation`
     describe the effect of friction at low frequency. `aside` has, for every log, the relative errors with which the
-    other logs' model predicts its outputs. `warnings` say what was not found, and why.
+    model of another log predicts its outputs. `warnings` say what was not found, and why.
     """
 
     logs: tuple[Log, ...]
@@ -164,9 +164,10 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 
 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
-    """Keep the lines on which the responses of both outputs stand out of the noise.
+    """Keep the spectral lines on which the response of any output stands out of the noise.
 
-    Raises InputError where none does.
+    Returns the response of the driven mass, and of the other if measured. Raises InputError for an output that stands
+    out on no line.
     """
     good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
     usable = [response.at(np.isin(response.frequency, good)) for response in responses]
@@ -182,13 +183,13 @@ def _below(model: TwoMass, band: FrequencyRange) -> bool:
 
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRange:
-    """Return the band above the departure by friction."""
+    """Return the band [Hz] above the frequencies at which friction distorts the response."""
     low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
     return max(float(driven.frequency[0]), low), _top(driven)
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """Return the highest frequency [Hz] of the lines, raised by rounding errors."""
+    """Return the highest frequency [Hz] of the response, plus rounding so that it is included."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -225,9 +226,9 @@ def _friction(
     model: TwoMass | None,
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
-    """Return the friction that explains the departure from the mass line, and a test of it.
+    """Return the friction that bends the response off the mass line, and a test of it.
 
-    The test is a simulation with the estimated friction.
+    The test is a simulation with the estimated friction. Either is None if it fails; `warnings` then get the reason.
     """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
@@ -261,7 +262,7 @@ def _left_out(
     band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return, for each log, the relative errors with which the other logs' model predicts it."""
+    """Return, for each log, the relative errors with which the model of another log predicts it."""
     if len(logs) < 2:
         return ()
     rows = []

@@ -19,11 +19,12 @@ OVERLAP = 1 / 36
 
 
 def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
-    """Estimate a response and its coherence by overlapping Hann segments of 1/`resolution` [Hz].
+    """Estimate a response and its coherence by averages over overlapping Hann segments.
 
-    Without a reference the estimate is H1. Its variance is the power of the output that is not coherent with the
-    external signal (Bendat, Piersol, Random Data, 4th ed., ch. 9), divided by the effective number of segments. Leakage
-    is not included: a mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
+    The length of a segment is one over the `resolution` [Hz]. Without a reference the estimate is H1. Its variance is
+    the power of the output that is not coherent with the external signal (Bendat, Piersol, Random Data, 4th ed., ch.
+    9), divided by the effective number of segments. Leakage is not included: a mode sharper than the resolution comes
+    out too low. Raises InputError for fewer than 4 segments.
     """
     record = record.checked()
     length = round(1 / (resolution * record.sample_time))

@@ -46,9 +46,9 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 
 
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,).
+    """Return lower and upper limits of the parameters: delay, hold, and compliances.
 
-    The model covers frequencies up to `top` [Hz].
+    Each has the shape (COMPLIANCES + outputs,). The model covers frequencies up to `top` [Hz].
     """
     late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
@@ -65,8 +65,8 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 
 
 def _longest(response: FrequencyResponse, share: float) -> float:
-    """Return the sample time [s] of a response.
+    """Return the sample time [s] of a response or, if not known, the longest that is plausible.
 
-    If it is not known, return a fraction of the period of the highest frequency.
+    That is the fraction `share` of the period of the highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

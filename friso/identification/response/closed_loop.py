@@ -21,8 +21,8 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). The periodic part of the input
     is removed; an input that repeats exactly contains no reaction. Slow or weak loops stay undetected.
 
-    The present sample of the output counts as past, because a position cannot react to a force within one sample;
-    `direct` tells that this output reacts within a sample (an acceleration).
+    The present sample of the output counts as past, because a position cannot react to a force within one sample.
+    `direct` is true for an output that does, such as an acceleration.
     """
     settings = ResponseSettings.current()
     record = record.checked(settings.samples_of_a_feedback_test)
@@ -86,9 +86,9 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 
 
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
-    """Describe where a direct and an indirect estimate differ by more than their deviations.
+    """Describe where estimates without and with the reference differ beyond their deviations.
 
-    Both must have the same lines.
+    Both must have the same spectral lines. The result is empty if they agree.
     """
     settings = ResponseSettings.current()
     _same_lines(direct, indirect)
@@ -142,6 +142,6 @@ def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, flo
 
 
 def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
-    """Check that two responses have the same lines."""
+    """Check that two responses have the same spectral lines."""
     if not np.array_equal(first.frequency, second.frequency):
         raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

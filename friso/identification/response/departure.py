@@ -24,9 +24,9 @@ F/v (Gelb, Vander Velde 1968, table E.2: random-input describing function of the
 class Departure:
     """Where a response leaves its linear model at low frequency.
 
-    Below `frequency` the response differs from the model; `excess` (lines,) is |G/G_model| at `lines` [Hz]. `differ`
-    tells whether realisations differ there by more than noise (chance below 1 %), None with a single realisation;
-    `ratio` is their scatter relative to the noise.
+    Below `frequency` [Hz] the response differs from the model. `excess` (lines,) is |G/G_model| at all frequencies
+    `lines` [Hz]. `differ` tells whether realisations differ below `frequency` by more than noise (chance below 1 %),
+    None with a single realisation. `ratio` is their scatter there relative to the noise.
     """
 
     frequency: Estimate
@@ -39,10 +39,9 @@ class Departure:
 def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndarray]) -> Departure:
     """Find where a response leaves `model`, a function of frequencies [Hz], at its low end.
 
-    The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
-    degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
-    the model is taken to hold as well as it can. The interval is the highest window that departs. Raises InputError for
-    fewer than 36 lines.
+    In windows of neighbouring lines in the lower half, the mean of the ratio of response to model is tested against 1
+    (F-test). The scale of the test comes from the upper half, where the model is taken to hold as well as it can. The
+    departure ends with the highest window that differs. Raises InputError for fewer than 36 lines.
     """
     settings = ResponseSettings.current()
     frequency = response.frequency
@@ -73,7 +72,10 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Tell whether distortion exceeds the noise on a part of the lines, and by which ratio."""
+    """Tell whether distortion exceeds the noise on a part of the lines, and their ratio.
+
+    The ratio is that of noise with distortion to noise alone. The first result is None if the distortion is not known.
+    """
     settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
     if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
@@ -105,13 +107,14 @@ class Drag:
 def friction_from_departure(
     response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
 ) -> Drag:
-    """Return the friction that explains how a response leaves its mass line.
+    """Return the friction that explains how a response leaves its mass line at low frequency.
 
-    The departure is fitted between `limits` [Hz]. `velocities` are those of the realisations, each of shape (n,),
-    [output unit/s]. Under a broad-band excitation Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation
-    of the velocity: 1/(m s^2 + d s + k) is fitted. The interval covers the interval of the damping and the difference
-    between two distributions of the velocity, normal and sinusoidal (gain 4/pi over the amplitude). It is valid while
-    the body slides most of the time. Raises InputError for fewer than 8 lines.
+    The model 1/(m s^2 + d s + k) is fitted between `limits` [Hz]. Under a broad-band excitation, Coulomb friction F
+    acts as a damper d = sqrt(2/pi) F/(standard deviation of the velocity), as long as the body slides most of the time.
+    `velocities` [output unit/s] are those of the realisations, each of shape (n,).
+
+    The interval of the friction covers that of the damping. It also covers the difference between normal and sinusoidal
+    velocities (gain 4/pi over the amplitude). Raises InputError for fewer than 8 lines.
     """
     part = response.between(*limits)
     if len(part.frequency) < 8:

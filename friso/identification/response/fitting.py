@@ -46,7 +46,7 @@ class ResponseFit:
         return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
 
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
-        """Return a function of the parameters, and its deviation to first order.
+        """Return the value of a function of the parameters, and its deviation to first order.
 
         The value is NaN or infinite for undetermined parameters that overflow.
         """
@@ -90,9 +90,9 @@ def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
 
 
 def deviations(response: FrequencyResponse) -> np.ndarray:
-    """Return the deviation of each line for weighting, at least a thousandth of the response.
+    """Return the deviation by which each spectral line is weighted, shape (lines,).
 
-    No model is more accurate than a thousandth.
+    Every deviation is at least a thousandth of the response, because no model is more accurate.
     """
     return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 

@@ -49,7 +49,7 @@ def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
 
 
 def _sign(response: FrequencyResponse) -> float | None:
-    """Return the sign of the widest line, whatever its slope."""
+    """Return the sign of the widest straight line of a response, whatever its slope."""
     lines = [line for slope in KINDS for line in straight_lines(response, slope, None, 1)]
     return max(lines, key=lambda line: line.octaves).sign if lines else None
 

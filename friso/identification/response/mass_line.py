@@ -90,7 +90,7 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
 def _parted(
     response: FrequencyResponse, slope: int, first: tuple[int, int, float], second: tuple[int, int, float]
 ) -> bool:
-    """Tell whether there is a mode between two bands."""
+    """Tell whether there is a mode between two bands, each given by its first and last line."""
     lower, upper = sorted([first, second])
     level = _flat(response, slope, 1.0)[1]
     between = level[lower[1] + 1 : upper[0]]
@@ -111,9 +111,9 @@ def _widest(
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
-    """Return the widest band with acceptable chi-square and phase, between two lines.
+    """Return the widest band with acceptable chi-square and phase, as its first and last line.
 
-    All pairs of ends are tried.
+    All pairs of ends from line `start` to line `stop` are tried. Returns None if no band is wide enough.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
@@ -141,14 +141,20 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
 
 
 def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndarray, ...]:
-    """Return frequency, log level, phase off the line, and relative deviation, each (lines,)."""
+    """Return frequency, log level, phase off the line, and relative deviation, each (lines,).
+
+    The response is multiplied by (i omega)^`slope`, so that a straight line of this slope is level.
+    """
     value = sign * response.response * (2j * np.pi * response.frequency) ** slope
     relative = response.scatter() / np.abs(response.response)
     return response.frequency, np.log(np.abs(value)), np.angle(value), relative
 
 
 def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> StraightLine:
-    """Make the straight line of a band: its level, interval, and stiffness, damping or mass."""
+    """Describe a straight band of a response: its level, and stiffness, damping or mass.
+
+    `slope` is 0 for a stiffness, 1 for a damping and 2 for a mass line. `sign` is -1 if the output opposes the input.
+    """
     mean, half, independent = _level(response, slope, sign, band)
     low, high = float(response.frequency[band][0]), float(response.frequency[band][-1])
     method = f"{KINDS[slope]}, {low:.3g} to {high:.3g} Hz"
@@ -195,7 +201,7 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
 
 
 def _independent(residual: np.ndarray) -> float:
-    """Return the effective number of independent lines, from the correlation of neighbours.
+    """Return the effective number of independent residuals, from the correlation of neighbours.
 
     The sum of correlations comes out too small in a short band. A first-order autoregression does not, and is used if
     it gives fewer.

@@ -54,7 +54,7 @@ def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
 def repetition(signal: np.ndarray) -> np.ndarray:
     """Return how much a signal, shape (n,), changes over lags of 0 to n/2 samples.
 
-    It is the mean squared change in units of twice the variance.
+    The change is the mean square over the record, in units of twice the variance.
     """
     centred = signal - signal.mean()
     n, lags = len(centred), np.arange(len(centred) // 2 + 1)
@@ -88,7 +88,10 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """Return the lags [samples] at which a signal repeats, except for a slip of its clock."""
+    """Return lags [samples] at which a signal would repeat, but for a slip of its clock.
+
+    The change after two such lags is several times the change after one.
+    """
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
     inner = inner[inner + 1 < len(change)]

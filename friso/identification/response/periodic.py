@@ -65,7 +65,7 @@ def multisine(
 
 
 def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
-    """Bring realisations to common lines, with remarks on their clocks.
+    """Bring the spectra of realisations to common frequencies; also return remarks on clocks.
 
     Raises InputError without common lines.
     """
@@ -88,7 +88,7 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
 
 
 def _first_lines(realisation: Spectra, count: int) -> Spectra:
-    """Return the first so many lines of a realisation."""
+    """Return the first `count` spectral lines of a realisation."""
     names = ("frequency", "reference", "excited", "input", "output")
     return replace(realisation, **{name: getattr(realisation, name)[..., :count] for name in names})
 
@@ -118,7 +118,7 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deviation of the mean over realisations, and its degrees of freedom."""
+    """Return the deviation of the mean response over realisations, and its degrees of freedom."""
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)

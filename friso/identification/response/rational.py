@@ -1,8 +1,8 @@
 """Fit rational responses (rigid body, modes, constant, delay), and choose the number of modes.
 
 The response is R/(s (s + delta)) + sum of r_i/(s^2 + 2 zeta_i omega_i s + omega_i^2) + c, times exp(-s delay), with s
-over a scale. Modes are added one at a time, each started where it helps most; the nonlinear parameters are refined with
-the linear ones (residues) eliminated.
+over a scale. Modes are added one at a time, each started where it helps most. The nonlinear parameters are refined by
+iteration; the linear parameters R, r_i and c follow by least squares at each step.
 """
 
 from __future__ import annotations
@@ -89,7 +89,11 @@ def _better(larger: Row, smaller: Row) -> bool:
 
 
 def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return the complex factors of the linear parameters, shape (linear, lines)."""
+    """Return the complex responses, (linear, lines), whose weighted sum is the model's response.
+
+    There is one for the rigid body, if the model has one, one for each mode, and 1 for the constant, if it has one. The
+    linear parameters are the weights.
+    """
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
     parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
@@ -150,7 +154,7 @@ def _another(
 def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Refine nonlinear parameters with the linear ones eliminated (Golub, Pereyra 1973)."""
+    """Refine the nonlinear parameters; linear ones follow at each step (Golub, Pereyra 1973)."""
     settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:

@@ -138,7 +138,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
-    """Write sentences on periods that are left out."""
+    """Write sentences on periods left out: those with another input, and transient ones."""
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
     if first:
@@ -191,7 +191,7 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
 
 
 def _same_excitation(driving: np.ndarray) -> np.ndarray:
-    """Tell in which periods the external signal equals that of most periods."""
+    """Tell in which periods the external signal is the same as in most periods."""
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
@@ -219,8 +219,8 @@ def _excited(driving: np.ndarray) -> np.ndarray:
 def _transient_periods(reaction: np.ndarray) -> int:
     """Count the leading periods that are transient, by the output (periods, lines).
 
-    At least three periods are kept. Each period is compared with the later half of the others. The limit on the
-    distance makes it rare that a period without a transient is dropped by chance.
+    A period counts as transient if it differs too much from the later half of the others. The limit is so high that a
+    period without a transient is rarely dropped. At least three periods are kept.
     """
     count = len(reaction)
     last = max(3, count // 2)
@@ -232,7 +232,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
 
 
 def _distance(single: np.ndarray, others: np.ndarray) -> float:
-    """Return how far a period lies from the mean of others, in units of their variance.
+    """Return the squared distance of a period from the mean of others, over their variance.
 
     The median over its lines is taken.
     """

@@ -37,15 +37,15 @@ class ResponseBand:
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """A response on the lines `frequency` [Hz]; all arrays have the shape (lines,).
+    """A response at the spectral lines `frequency` [Hz]; all arrays have the shape (lines,).
 
     `response` is complex [output unit per input unit]. `deviation` is its total standard deviation, sqrt(E|error|^2).
     Its parts are `noise` (differs from period to period) and `distortion` (differs from realisation to realisation):
     deviation^2 = noise^2 + distortion^2 if both are known, else NaN.
 
     `degrees` is the number of real degrees of freedom behind the deviation. `coherence` is between input and output
-    (None: not known). `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is the record's (None:
-    not known).
+    (None: not known). `kind` is "multisine", "welch", "local polynomial" or "measured". `sample_time` [s] is the
+    record's (None: not known).
     """
 
     frequency: np.ndarray
@@ -72,14 +72,14 @@ class FrequencyResponse:
         return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
-        """Convert the response to python-control's data, over rad/s, with a line at 0 Hz if any."""
+        """Convert the response to data for python-control, over frequencies in rad/s."""
         from control import FrequencyResponseData
 
         omega = 2 * np.pi * self.frequency
         return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
 
     def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """Return the response to another output, by an exact complex `factor` per line, (lines,)."""
+        """Return the response of another output, by an exact complex `factor` per line, (lines,)."""
         size = np.abs(factor)
         return replace(
             self,
@@ -91,18 +91,18 @@ class FrequencyResponse:
         )
 
     def accelerations(self) -> FrequencyResponse:
-        """Return the response from position to acceleration: times (i omega)^2."""
+        """Return the response of the acceleration in place of the position: times (i omega)^2."""
         unit = f"{self.channels.output_unit}/s^2"
         return self.times(-((2 * np.pi * self.frequency) ** 2), "acceleration", unit)
 
     def at(self, chosen: np.ndarray) -> FrequencyResponse:
-        """Return the lines chosen by a mask or by numbers."""
+        """Return the response at spectral lines that a mask or their numbers choose."""
         names = ("frequency", "response", "deviation", "noise", "distortion", "degrees")
         lines = {name: getattr(self, name)[chosen] for name in names}
         return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **lines)
 
     def between(self, low: float, high: float) -> FrequencyResponse:
-        """Return the lines from `low` to `high` [Hz], both included.
+        """Return the response at spectral lines from `low` to `high` [Hz], both included.
 
         Raises InputError where there are none.
         """
@@ -114,7 +114,7 @@ class FrequencyResponse:
         return self.at(inside)
 
     def usable(self, ratio: float = 3.0) -> FrequencyResponse:
-        """Return the lines that are clear of noise, at least `ratio` deviations large.
+        """Return the response at spectral lines that are clear of noise: `ratio` deviations large.
 
         Their coherence must also suffice, if it is known. Warnings list the lines left out. Raises InputError if none
         is left, because the excitation is too weak.

@@ -1,4 +1,4 @@
-"""Simulate a mass with Coulomb friction and a spring under recorded forces, to explain a departure."""
+"""Simulate a mass with Coulomb friction and a spring, to explain a measured response."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from friso.identification.response.settings import ResponseSettings
 
 @dataclass(frozen=True)
 class Explanation:
-    """A simulation of friction, and its residual against the departure of a measured response.
+    """A simulation of friction, compared with a measured response that leaves its mass line.
 
     `responses` are simulated responses by the factor on the recorded input. `left` is the fraction of the departure
-    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain: 0
-    means a full explanation, 1 none.
+    from the mass line, weighted by the deviations, that the simulation with the recorded input does not explain. It is
+    0 for a full explanation and 1 for none.
     """
 
     responses: Mapping[float, FrequencyResponse]
@@ -67,7 +67,7 @@ def slid(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Simulate a mass [kg] on a spring [N/m] with Coulomb friction [N] under forces [N].
 
-    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (lanes, n). Time stepping
+    The mass starts at rest. Returns position [m] and velocity [m/s], with the forces' shape (runs, n). Time stepping
     treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass if it can within the
     step. The error is of first order in the sample time.
     """
@@ -83,7 +83,7 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the fraction of the departure from the mass line that a simulation leaves."""
+    """Return the fraction of a response's distance from its mass line that a simulation leaves."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

@@ -31,9 +31,9 @@ DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
 class TwoMass:
     """A driven mass, a joint and another mass, as fitted to a response.
 
-    The unit of masses is input per acceleration. `fit` has the parameters at the module's indices; `signs` of the two
-    outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping, viscous friction, delay,
-    antiresonance and resonance.
+    The unit of masses is input per acceleration. `fit` has the parameters, in the order of the constants of this
+    module. `signs` of the two outputs are -1 if they oppose the input. `estimates` has masses, stiffness, damping,
+    viscous friction, delay, antiresonance and resonance.
     """
 
     signs: tuple[float, float]
@@ -47,7 +47,10 @@ class TwoMass:
         return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
-        """Return the complex response of the driven mass, or of the other mass, at frequencies [Hz]."""
+        """Return the complex response of one mass, shape (n,), at frequencies [Hz], shape (n,).
+
+        It is the driven mass if `collocated`, otherwise the other mass.
+        """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
 
@@ -78,7 +81,8 @@ def fit_two_mass(
 ) -> TwoMass:
     """Fit the two-mass model to force-to-position responses in a `band` [Hz] (default: all).
 
-    The responses must have the same lines. Raises InputError if they do not, or for too few lines.
+    `collocated` is the response of the driven mass, `noncollocated` that of the other mass, if measured. Both must have
+    the same lines. Raises InputError if they do not, or for too few lines.
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
     if band is not None:
@@ -144,9 +148,9 @@ def _sign(response: np.ndarray) -> float:
 
 
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
-    """Check that a model is near the response, shape (outputs, lines), somewhere.
+    """Check that a model follows a response, shape (outputs, lines), at least roughly.
 
-    Raises InputError if it is not.
+    Raises InputError if it misses the magnitude by too large a factor on average.
     """
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
     if off > ResponseSettings.current().misfit_of_no_model:
@@ -156,7 +160,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 
 
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
-    """Return a start from the first antiresonance and resonance of a rational fit.
+    """Return a start of the fit from the first antiresonance and resonance of a rational fit.
 
     The total mass is 1. Returns [] without both.
     """
@@ -239,7 +243,7 @@ def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
-    """Yield warnings for the user of the model."""
+    """Yield a sentence for each output whose sign was reversed, and for a poor fit."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
@@ -274,7 +278,7 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
 
 
 def _root(parameters: np.ndarray, zero: bool) -> complex:
-    """Return the pole or the collocated zero with the largest imaginary part [rad/s]."""
+    """Return the pole, or the zero of the driven mass, with the largest imaginary part [rad/s]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     first = np.array([driven, parameters[DRAG] + damping, stiffness])
     second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
@@ -286,5 +290,5 @@ def _root(parameters: np.ndarray, zero: bool) -> complex:
 
 
 def _si(unit: str) -> str:
-    """Shorten units to kg, N/m and the like where input is in newtons and output in metres."""
+    """Shorten a unit to kg, N s/m and so on where input is in newtons and output in metres."""
     return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

@@ -65,7 +65,7 @@ def cell_edges(centres: Array, *, log: bool = False) -> Array:
 def colour_prefix(field: Coloured) -> tuple[float, str]:
     """Return factor and prefixed unit for the numbers of a map or cloud.
 
-    Its limits decide, or else all its numbers.
+    The limits of the colours decide, or without limits all numbers.
     """
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
@@ -88,7 +88,7 @@ def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
 
 
 def line_key(figure: Figure) -> list[Series]:
-    """Return the labelled lines of panels, each once, for the common legend."""
+    """Return the labelled lines of panels with maps or clouds, each once, for the common legend."""
     lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
     return list({(line.label, line.colour, line.dash): line for line in lines}.values())
 
@@ -142,7 +142,7 @@ def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
 
 
 def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
-    """Return factor and unit with prefix."""
+    """Return the factor and the prefixed unit that suit the values of an axis."""
     return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
 
 

@@ -94,7 +94,7 @@ class Band:
     colour: str
 
     def __post_init__(self) -> None:
-        """Check that all arrays are finite and of equal length. Raises ValueError."""
+        """Check that all arrays are finite and of equal length. Raises ValueError if they are not."""
         _same_length(self.label, self.x, self.low)
         _same_length(self.label, self.x, self.high)
         if not np.isfinite([self.x, self.low, self.high]).all():
@@ -152,7 +152,7 @@ class Coloured:
     codes: Array | None = None
 
     def __post_init__(self) -> None:
-        """Check that codes have the shape of the numbers. Raises ValueError."""
+        """Check that codes have the shape of the numbers. Raises ValueError if they have not."""
         if self.codes is not None and np.shape(self.codes) != np.shape(self.z):
             raise ValueError(
                 f"map of {self.quantity}: codes have the shape {np.shape(self.codes)}, expected that of z, "
@@ -242,6 +242,6 @@ class Figure:
 
 
 def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Array) -> None:
-    """Check that x and y have one length. Raises ValueError."""
+    """Check that x and y have one length. Raises ValueError if they have not."""
     if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
         raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")

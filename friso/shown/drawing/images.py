@@ -26,9 +26,9 @@ PROGRAM, MOST = "friso.shown.drawing.artist", 2
 
 
 class Image(NamedTuple):
-    """A form of a figure: its format, one of FORMATS, and whether it has heading and note.
+    """What is wanted of a figure's image: its format, and whether it has heading and note.
 
-    An image without heading or note is cut off there.
+    The format is one of FORMATS. An image without heading or note is cut off there.
     """
 
     form: str
@@ -41,9 +41,9 @@ ON_PAGE = Image("svg", headed=False)
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """Return an image of a figure, as `Image` describes it.
+    """Return an image of a figure as the bytes of a file, with or without heading and note.
 
-    Raises ValueError for an unknown format.
+    `form` is one of FORMATS. Raises ValueError for any other.
     """
     if artists := _ARTISTS.get():
         drawn = artists.drawn(figure, Image(form, headed, noted))

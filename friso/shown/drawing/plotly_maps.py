@@ -79,9 +79,9 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
 
 
 def _cells(centres: Array, axis: Axis) -> Array:
-    """Return the centres or edges of cells along an axis, as plotly needs them.
+    """Return the centres of cells along an axis, or the edges of a single cell, for plotly.
 
-    Plotly finds edges between centres as `cell_edges` does, but not those of a single cell.
+    Plotly itself finds the edges between centres, but not those of a single cell.
     """
     return cell_edges(centres, log=axis.log) if len(centres) == 1 else centres
 

@@ -52,7 +52,7 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
 def pretty(unit: str) -> str:
     """Return a unit as it is printed: "N*s/m^2" becomes "N·s/m²".
 
-    It follows the kind of axis.
+    On a rotary axis it becomes a rotary unit.
     """
     unit = unit_shown(unit)
     for plain, raised in _POWERS.items():

@@ -16,7 +16,7 @@ from friso.identification.logs.units import split_heading
 def read_lvm(path: Path) -> ChannelTable:
     """Read a LabVIEW measurement text.
 
-    Raises LogError.
+    Raises LogError if the library lvm_read is missing or cannot read the file.
     """
     file = content_by("lvm_read", "LVM", path)
     segments = range(int(file["Segments"]))

@@ -49,7 +49,7 @@ def read_mat(path: Path) -> ChannelTable:
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
-    """Return the channels without the variable's name, if they are distinct without it."""
+    """Leave the variable's name out of the names of channels that stay unique without it."""
     short = [channel.name.rpartition("/")[2] for channel in channels]
     names = [s if short.count(s) == 1 else c.name.replace("/", ".") for s, c in zip(short, channels, strict=True)]
     return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
@@ -78,7 +78,7 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
 
 
 def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
-    """Collect an array as one number, one channel, or one channel per column."""
+    """Add an array to the contents: as one number, one channel, or one channel per column."""
     values = np.squeeze(values)
     if values.ndim == 0:
         walk.scalars[name] = float(values)

@@ -15,7 +15,7 @@ from friso.identification.logs.units import split_heading
 def read_tdms(path: Path) -> ChannelTable:
     """Read the channels of a TDMS file of National Instruments.
 
-    Raises LogError.
+    Raises LogError if the library nptdms is missing or cannot read the file.
     """
     file = content_by("nptdms", "TDMS", path)
     channels, notes = [], []

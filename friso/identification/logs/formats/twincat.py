@@ -47,7 +47,7 @@ def is_twincat(lines: list[str]) -> bool:
 def read_twincat(path: Path) -> ChannelTable:
     """Read the channels of a Scope export with their own times.
 
-    Raises LogError.
+    Raises LogError for an export without data, or with rows that lack cells.
     """
     encoding, lines = decoded_head(path)
     delimiter = lines[0][4]
@@ -92,7 +92,7 @@ def _channels(
 ) -> tuple[tuple[Channel, ...], list[str]]:
     """Return the channels of all groups, and lines on how they were read.
 
-    Raises LogError.
+    Raises LogError for rows that lack cells in the middle.
     """
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
@@ -121,8 +121,8 @@ def _channels(
 def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
     """Check that no row lacks cells in the middle.
 
-    If cells of a group that has ended are missing with their delimiters, the cells behind them have moved to the left,
-    and the clock of another group jumps. Raises LogError.
+    Cells of a group that has ended may be missing together with their delimiters. The cells behind them have then moved
+    to the left, and the clock of another group jumps. Raises LogError for such a row.
     """
     ends = np.array(sorted({time.size for time in times} - {0}))
     for time in times:

@@ -59,7 +59,7 @@ def label(data: dict[str, Any], key: str) -> str:
 def read_uff(path: Path) -> ChannelTable:
     """Read the time histories of a universal file.
 
-    Raises LogError.
+    Raises LogError for a file without time histories.
     """
     times = [data for data in sets_58(path) if data["func_type"] == TIME_RESPONSE]
     if not times:
@@ -114,7 +114,7 @@ def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray |
 def read_response_uff(path: Path) -> MeasuredResponse:
     """Read the response in a universal file.
 
-    Raises LogError.
+    Raises LogError for a file without a usable response, or with several.
     """
     data, frequency, coherence = frequency_sets(path)
     above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
