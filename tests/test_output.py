@@ -205,7 +205,10 @@ def test_a_text_that_was_edited_is_not_replaced(tmp_path: Path) -> None:
         OutputFolder("identify", out, overwrite=False)
     assert (out / "machine.toml").read_text() == "a = 3\n"
     OutputFolder("identify", out, overwrite=True).write({"machine.toml": "a = 4\n", "plot.png": b"4"})
-    OutputFolder("identify", out, overwrite=False)
+    OutputFolder("identify", out, overwrite=False).write({"plot.png": b"5"})  # the text stays, with its digest
+    (out / "machine.toml").write_text("a = 6\n")
+    with pytest.raises(InputError, match=r"machine\.toml was changed"):
+        OutputFolder("identify", out, overwrite=False)
 
 
 def test_a_file_that_friso_has_not_written_stays(

@@ -7,6 +7,7 @@ says, or left out. Every function must accept such a stage, or refuse it in one 
 from __future__ import annotations
 
 import random
+import re
 import signal
 import tomllib
 import warnings
@@ -104,7 +105,7 @@ def _computed_for(seconds: float) -> Iterator[None]:
 def _assert_complete(answer: Answer) -> None:
     """Raise AssertionError if the words of an answer lack a number; write its tables and its document."""
     for sentence in answer.sentences():
-        assert not {"nan", "inf", "None"} & {*sentence.replace(",", " ").split()}, f"a number is missing: {sentence}"
+        assert not re.search(r"(?<![\w.])(nan|inf)(?!\w)", sentence), f"a number is missing: {sentence}"
     list(answer.tables())
     answer.to_dict()
 

@@ -43,6 +43,8 @@ def cycle_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], rtol: floa
     if not cycles.closed[0]:
         return None
     orbits = close(stages, cycles.states, cycles.orbits.times, cycles.sign, rtol, cycles.swings)
+    if not orbits.closed[0]:
+        return None
     flow = flow_derivatives(stages, keys, orbits.states, orbits.times, rtol)
     if flow is None:
         return None

@@ -171,8 +171,8 @@ def judge_runs(
     """Judge stages from motions and attractors that are already computed.
 
     Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion was not
-    completed, or if it is not certain what attracts it. `rtol` is the relative tolerance of further runs. `threads`
-    bounds the threads of runs, and setting `cancel` stops them.
+    completed. It is "undecided" if its attractors, or the end of its motion, are not certain. `rtol` is the relative
+    tolerance of further runs. `threads` bounds the threads of runs, and setting `cancel` stops them.
     """
     count, target = len(motions.completed), attracted.target
     stages = Ensemble.held(flat, count, form=shared_structure(flat))

@@ -1,8 +1,8 @@
 """Write the files of a command, all of them or none.
 
 The folder must be new, empty, a store of friso map, or the command's own from an earlier run, which a small marker file
-shows. Otherwise the command refuses and names --overwrite. A file that the user names must be new, too. No command ever
-replaces a file that it reads.
+shows. Otherwise the command refuses and names --overwrite; it does so, too, if a text in the folder was edited since. A
+file that the user names must be new, too. No command ever replaces a file that it reads.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from friso.errors import InputError
 from friso.interface.drafts import DRAFTS, Drafts, made
@@ -43,6 +43,10 @@ UNFINISHED = ".friso-unfinished"
 """Name of the folder in which a long command keeps finished parts until it has ended."""
 
 
+Digests: TypeAlias = "Mapping[str, tuple[str, ...]]"
+"""SHA-256 of the texts that friso wrote into a folder, by name: of the last one and the one before."""
+
+
 class OutputFolder:
     """The folder that a command writes into; `inputs` are the files that it reads."""
 
@@ -63,11 +67,13 @@ class OutputFolder:
             raise _of_others(folder, maker, f"one that friso {command} made{more}")
         own = [name for name in self.files if self.is_own]
         self.check(own)
-        if edited_texts(folder) and not overwrite:
-            actual = f"{folder}, where {_first_names(edited_texts(folder))} was changed after friso had written it"
-            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(folder))
         for name in own:
             self._check_free(name)
+        self.digests = digests_of(folder) if self.is_own else {}
+        edited = [name for name, digests in self.digests.items() if _is_edited(folder / name, digests)]
+        if edited and not overwrite:
+            actual = f"{folder}, where {_first_names(edited)} was changed after friso {command} had written it"
+            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(folder))
 
     @property
     def unfinished(self) -> Path:
@@ -111,22 +117,24 @@ class OutputFolder:
         gone = {name for name, content in files.items() if content is None}
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
         leaving = [name for name in gone if os.path.lexists(self.folder / name)]
+        # After a kill, a text may be the earlier one or the new one; neither was edited.
+        new = {name: digest(content) for name, content in files.items() if isinstance(content, str)}
+        digests = self.digests | {name: (one, *self.digests.get(name, ())[:1]) for name, one in new.items()}
         # The marker comes first: if the process is killed, the next run knows which files are its own.
-        write({**self._marker([*names, *leaving], {}), **contents, **(beside or {})}, own, progress)
+        write({**self._marker([*names, *leaving], digests), **contents, **(beside or {})}, own, progress)
         if self.is_own:
-            self.is_marked, self.files = True, tuple(names)
-        # Digests come last: a killed run must not make the next one take its files for edited ones.
-        texts = {name: digest(content) for name, content in files.items() if isinstance(content, str)}
-        write(self._marker(names, texts), [self.folder / MARKER])
+            self.is_marked, self.files, self.digests = True, tuple(names), digests
+        if leaving:
+            write(self._marker(names, digests), [self.folder / MARKER])
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
         if earlier:
             LOGGER.warning(f"{_first_names(earlier)} in {self.folder} are of an earlier run, and were left there")
         return written(contents)
 
-    def _marker(self, names: Iterable[str], texts: Mapping[str, str]) -> dict[Path, Content]:
+    def _marker(self, names: Iterable[str], digests: Digests) -> dict[Path, Content]:
         """Return the marker file, if the folder is the command's own; see `marker`."""
-        return {self.folder / MARKER: marker(self.command, names, texts)} if self.is_own else {}
+        return {self.folder / MARKER: marker(self.command, names, digests)} if self.is_own else {}
 
 
 def refuse_place(option: str, path: Path) -> None:
@@ -256,13 +264,10 @@ def digest(text: str) -> str:
     return sha256(text.encode()).hexdigest()
 
 
-def marker(command: str, names: Iterable[str], texts: Mapping[str, str]) -> str:
-    """Return the text of the marker file: the command, and the files that it wrote.
-
-    `texts` are the digests of those that a user may edit.
-    """
+def marker(command: str, names: Iterable[str], digests: Digests) -> str:
+    """Return the text of the marker file: the command, the files that it wrote, and digests of its texts."""
     lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
-    lines += ["", "[texts]", *(f"{as_toml(name)} = {as_toml(sum_)}" for name, sum_ in texts.items())]
+    lines += ["", "[digests]", *(f"{as_toml(name)} = {as_toml(' '.join(of))}" for name, of in digests.items())]
     return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
 
 
@@ -283,14 +288,22 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     return command, tuple(str(name) for name in files)
 
 
-def edited_texts(folder: Path) -> list[str]:
-    """Return the names of texts in a folder that were changed after friso had written them."""
+def digests_of(folder: Path) -> Digests:
+    """Return the digests of the texts in a folder, by its marker; empty without a marker that has them."""
     try:
-        texts = parsed(text_of(folder / MARKER, "a marker"), "a marker").get("texts", {})
+        table = parsed(text_of(folder / MARKER, "a marker"), "a marker").get("digests")
     except InputError:
-        return []
-    present = [name for name in texts if (folder / name).is_file()] if isinstance(texts, dict) else []
-    return [name for name in present if sha256((folder / name).read_bytes()).hexdigest() != texts[name]]
+        return {}
+    entries = table.items() if isinstance(table, dict) else ()
+    return {str(name): tuple(of.split()) for name, of in entries if isinstance(of, str)}
+
+
+def _is_edited(text: Path, digests: Sequence[str]) -> bool:
+    """Tell whether a text is another than friso wrote; not where it cannot be read."""
+    try:
+        return sha256(text.read_bytes()).hexdigest() not in digests
+    except OSError:
+        return False
 
 
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:

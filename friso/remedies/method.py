@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Literal
@@ -122,8 +122,7 @@ class Advice:
 
         Leaf springs that make the joint of a remedy are no remedies of their own.
         """
-        works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
-        return tuple(sorted(works, key=lambda outcome: (not self.for_all_moves(outcome), self.size(outcome))))
+        return _working(self.outcomes, self.stage, self.goal)
 
     def for_all_moves(self, outcome: RemedyOutcome) -> bool:
         """Tell whether the goal holds with a remedy for all moves that were drawn."""
@@ -155,11 +154,25 @@ def slowest(outcome: RemedyOutcome, goal: Goal) -> float:
     return np.inf if outcome.measured is None else outcome.measured.slowest(goal)
 
 
-def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full, the smallest change first.
+def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tuple[RemedyOutcome, ...]:
+    """Return the remedies of a stage that work: those for all moves first, of these the smallest change first.
 
-    The choice is the smallest change and the one that settles soonest; if these are the same, the next larger change
-    follows.
+    Leaf springs that make the joint of another remedy are left out.
+    """
+
+    def rank(outcome: RemedyOutcome) -> tuple[bool, ChangeSize]:
+        assert outcome.measured is not None
+        assert outcome.stage is not None
+        return not outcome.measured.holds_for_all_moves(goal), change_size(stage, outcome.stage)
+
+    works = (outcome for outcome in outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
+    return tuple(sorted(works, key=rank))
+
+
+def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
+    """Choose which working remedies to describe in full.
+
+    These are the first, and the one that settles soonest; if that is the first, too, the second follows.
     """
     if not working:
         return ()
@@ -539,8 +552,7 @@ class _Session:
 
         The work allowed for searches does not limit this.
         """
-        working = (one for one in self.outcomes if one.certainty == "works" and not one.remedy.makes)
-        for one in _recommended(sorted(working, key=self._size), self.goal):
+        for one in _recommended(_working(self.outcomes, self.stage, self.goal), self.goal):
             if one.remedy.buys_joint:
                 self._made_of_leaves(one)
 

@@ -127,9 +127,11 @@ class Performance:
         return float(low), float(high)
 
     def holds_for_all_moves(self, goal: Goal) -> bool:
-        """Tell whether the goal holds from the smallest to the largest of the moves that were drawn."""
-        moves = self.moves_drawn
-        return moves is None or self.held_moves(goal) == (moves.smallest, moves.largest)
+        """Tell whether the goal holds for all moves that were drawn, but for a few at the ends that chance may miss."""
+        if self.moves_drawn is None:
+            return True
+        held = self.held_moves(goal)
+        return held is not None and np.mean((self.sizes >= held[0]) & (self.sizes <= held[1])) >= goal.share
 
     def _all_meeting(self, goal: Goal) -> np.ndarray:
         """Return which machines meet the whole goal, the further ones last."""

@@ -69,7 +69,7 @@ def sweep(
     - attractor: "cycle", "swing" where no orbit could be closed, "nothing", or "unknown" where it is not certain;
     - amplitude [m], cycle_period [s] and multiplier, of the largest swing that was found. They are NaN where nothing
       attracts, and the multiplier also where no orbit could be closed;
-    - verdict on the stage: "hunts", "bistable", "transient", "settles" or "failed".
+    - verdict on the stage: "hunts", "bistable", "transient", "settles", "undecided" or "failed".
 
     The attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
 

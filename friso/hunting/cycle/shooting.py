@@ -205,7 +205,18 @@ class _Shooting:
         for which in [np.flatnonzero(self.active & (kinds == kind)) for kind in range(4)]:
             if which.size:
                 self._advance(which, bool(renewed[which[0]]), self.rough_rtol if self.rough[which[0]] else self.rtol)
+        self._refine()
         return bool(self.active.any())
+
+    def _refine(self) -> None:
+        """Let fine runs go on where rough ones have nearly closed an orbit, or stall close to one."""
+        settings = OrbitSettings.current()
+        near = self.rough & (self.gaps < settings.rough_gap)
+        stalled = self.rough & ~near & ~self.active & (self.gaps < settings.rough_stalled_gap)
+        self.states[stalled], self.times[stalled] = self.best_states[stalled], self.best_times[stalled]
+        refined = near | stalled
+        self.rough[refined], self.active[refined] = False, True
+        self.gaps[refined], self.idle[refined] = np.inf, 0
 
     def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
         """Take one step of the orbits numbered `which`, with a new Jacobian or with the last one.
@@ -266,15 +277,6 @@ class _Shooting:
         )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
-        self._refine(which[self.rough[which]])
-
-    def _refine(self, which: np.ndarray) -> None:
-        """Let fine runs go on where rough ones have nearly closed an orbit."""
-        settings = OrbitSettings.current()
-        near = self.gaps[which] < np.where(self.active[which], settings.rough_gap, settings.rough_stalled_gap)
-        refined = which[near]
-        self.rough[refined], self.active[refined] = False, True
-        self.gaps[refined], self.idle[refined] = np.inf, 0
 
     def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
         """Take a Newton step of limited length for the orbit numbered `k`; return the step.
@@ -295,7 +297,7 @@ class _Shooting:
     @property
     def orbits(self) -> Orbits:
         """Return the best orbits so far, and whether they are closed."""
-        closed = self.gaps < self.limit
+        closed = (self.gaps < self.limit) & ~self.rough
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
 

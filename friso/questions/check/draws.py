@@ -21,7 +21,11 @@ COLOURS = {
     "failed": GREY,
 }
 
-WHY_OPEN = "what attracts them or how their motion ends is not certain, or a simulation failed"
+OPEN = {
+    "undecided": "undecided (what attracts them, or how their motion ends, is not certain)",
+    "failed": "failed (their motion was not simulated to its end)",
+}
+"""What is said of draws with an open verdict."""
 
 BINS = 24
 """Number of bars in the histogram."""
@@ -137,8 +141,8 @@ def _sentence(name: str, draws: Draws) -> str:
         else f"of {draws.sample.count} draws, {none.format(percentage(probable.high))}."
     ]
     if open_ones:
-        counts = listed([f"{count} {'is' if count == 1 else 'are'} {word}" for word, count in open_ones.items()], "and")
-        sentences.append(f"{counts} ({WHY_OPEN}); the intervals cover both outcomes for these.")
+        counts = listed([f"{count} {OPEN[word]}" for word, count in open_ones.items()], "and")
+        sentences.append(f"{counts}; the intervals cover both outcomes for these.")
     if keys:
         key, separation = next(iter(keys.items()))
         sentences.append(

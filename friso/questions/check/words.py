@@ -245,7 +245,7 @@ def _settling(case: Case) -> str:
 
 def _later(case: Case) -> str:
     """Say that a motion which still swings at the end of its run comes to rest later."""
-    if case.settling_time.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON:
+    if case.in_the_end.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON or case.offset > _TEN_MICRON:
         return ""
     return f" (later than in its run of {with_unit(case.stage.flat()['motion.duration'], 's')})"
 

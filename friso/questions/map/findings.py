@@ -66,7 +66,8 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
     if not completed.any():
         return "No cell of the map has a result."
     if not holds.any() or np.array_equal(holds, completed):
-        return f"{finding.clause} in {'every' if holds.any() else 'no'} cell of the map."
+        certain = "" if completed.all() or not metrics()[name].doubt else " of which this is certain"
+        return f"{finding.clause} in {'every' if holds.any() else 'no'} cell of the map{certain}."
     share = f"{finding.clause} in {_percent(holds.sum(), completed.sum())} of the map"
     axes, inside = axes_of(runs), completed.copy()
     where = []

@@ -152,9 +152,16 @@ def _in_short(tuning: Advice) -> Iterator[str]:
     times = [slowest_time(outcome.measured, tuning.goal) for outcome in (least, fastest) if outcome.measured]
     if len(times) == 2:
         yield (
-            f"Least change: {least.remedy.name.removesuffix(LEAST)}, in position after {times[0]}. Soonest: "
-            f"{fastest.remedy.name}, after {times[1]}."
+            f"Least change{_for_all(tuning)}: {least.remedy.name.removesuffix(LEAST)}, in position after {times[0]}. "
+            f"Soonest: {fastest.remedy.name}, after {times[1]}."
         )
+
+
+def _for_all(tuning: Advice) -> str:
+    """Say that the least change holds for all moves, where another that works does not."""
+    least = tuning.least
+    every = least is not None and tuning.for_all_moves(least)
+    return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
 
 
 def _least_words(tuning: Advice) -> str:
@@ -166,11 +173,9 @@ def _least_words(tuning: Advice) -> str:
     if not tuning.interrupted:
         given_up = any(outcome.certainty == "given up" for outcome in sought)
         smaller = " (the search for a smaller one was given up, as it takes too much computing)" * given_up
-        every = tuning.least is not None and tuning.for_all_moves(tuning.least)
-        moves = " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
-        return f"The least change that works{moves}{smaller}"
+        return f"The least change that works{_for_all(tuning)}{smaller}"
     if tuning.least_sought or any(not outcome.interrupted for outcome in sought):
-        return "The least change so far that works"
+        return f"The least change so far that works{_for_all(tuning)}"
     return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
 
 
