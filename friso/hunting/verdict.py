@@ -253,7 +253,8 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > settings.runaway_swing_factor * _widest(attraction):
             doubt = RUNS_AWAY
-        word = verdicts(*np.ones((3, 1), bool), np.array([own.ends]), np.zeros(1, bool))[0]
+        sure = np.ones(1, bool)
+        word = verdicts(sure, sure, sure, np.array([own.ends]), ~sure)[0]
         if attraction.certain and not doubt:
             tell(word)
         begin(CheckPart.STARTS)

@@ -43,7 +43,7 @@ UNFINISHED = ".friso-unfinished"
 """Name of the folder in which a long command keeps finished parts until it has ended."""
 
 
-Digests: TypeAlias = "Mapping[str, tuple[str, ...]]"
+Digests: TypeAlias = "dict[str, tuple[str, ...]]"
 """SHA-256 of the texts that friso wrote into a folder, by name: of the last one and the one before."""
 
 

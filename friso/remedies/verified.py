@@ -131,7 +131,7 @@ class Performance:
         if self.moves_drawn is None:
             return True
         held = self.held_moves(goal)
-        return held is not None and np.mean((self.sizes >= held[0]) & (self.sizes <= held[1])) >= goal.share
+        return held is not None and bool(np.mean((self.sizes >= held[0]) & (self.sizes <= held[1])) >= goal.share)
 
     def _all_meeting(self, goal: Goal) -> np.ndarray:
         """Return which machines meet the whole goal, the further ones last."""
