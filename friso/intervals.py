@@ -109,7 +109,10 @@ class Span:
         return f'"{self.example}"'
 
     def read(self, entry: Any) -> Interval:
-        """Return the range of a text, if the key allows all of it. Raises InputError."""
+        """Return the range that a text such as "2 N .. 4 N" describes; a range stays as it is.
+
+        Raises InputError for a text that is no range, and for a range that the key does not allow in full.
+        """
         if isinstance(entry, Interval):
             return entry
         try:
@@ -159,9 +162,10 @@ def _reach(interval: Interval, of: Quantity | Number) -> str:
 
 
 def _read(entry: Any, of: Quantity | Number) -> tuple[float, Interval]:
-    """Return centre and range of a text, or of a single value.
+    """Return centre and range of a text such as "3 N +/- 10 %", or of a single value.
 
-    A tolerance may put ends beyond the bound of a quantity. Raises _Refused.
+    The ends may lie beyond the bound of the quantity; callers check that. Raises _Refused for any other text, and for a
+    range whose ends are reversed.
     """
     text = entry if isinstance(entry, str) else ""
     try:

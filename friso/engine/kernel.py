@@ -120,7 +120,10 @@ class Kernel:
 
     @property
     def full_state(self) -> tuple[str, ...]:
-        """Return the names of all values of a run at an instant: states, held numbers and modes."""
+        """Return the names of all values of a run at an instant: the states, then the held numbers.
+
+        Modes with memory, such as slipping, come last among the held numbers.
+        """
         return self.states + self.held
 
     @property

@@ -128,9 +128,9 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    """Write a function with this head, which returns the expressions.
+    """Return the source of a NumPy function with this head, which returns the expressions.
 
-    Cases that occur in several expressions are evaluated once.
+    A case distinction (`Piecewise`) that occurs in several expressions is evaluated once.
     """
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)

@@ -178,9 +178,11 @@ class Continuous(Blocks):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a signal behind a second-order filter with two states.
+        """Return a signal behind a second-order transfer function, with two states.
 
-        They are the signal divided by the denominator, and its rate.
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator; the first of `lower` is
+        1. One state is the signal divided by the denominator, the other is its rate of change. `rule` has no effect in
+        continuous time.
         """
         low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
         bend = (signal.value - low - lower[1] * slope) / lower[2]

@@ -18,7 +18,7 @@ HELD_FORCE = "held_force"
 
 @dataclass(frozen=True)
 class Driven:
-    """Structure of a stage that follows a log.
+    """Structure of a stage that follows a logged position or reference, with an external force.
 
     `velocity_samples` is the number of samples over which the drive differentiates the position; 0 means a controller
     in continuous time.

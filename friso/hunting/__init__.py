@@ -1,6 +1,7 @@
-"""Interface of friso.hunting, together with `criteria` and `measures` (docs/hunting.md).
+"""Offer what other packages may import from friso.hunting (docs/hunting.md).
 
-Other floors import from these three modules only; everything else in this folder may change.
+They may also import from `friso.hunting.criteria` and `friso.hunting.measures`. Everything else in this folder may
+change.
 """
 
 from friso.hunting.attractors import Target

@@ -220,9 +220,10 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
 
 
 def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
-    """Return derivatives of the states' rates of change by the states, (count, states, states).
+    """Return the Jacobian [1/s] of the loop at rest for each stage, (count, states, states).
 
-    They are taken at rest, and scaled. If `touched`, the stroke limiter is pressed, at twice the stroke.
+    Row i, column j has the derivative of the rate of state i by state j, in units of the states' `scales`. In a
+    backlash, the motor stands on a flank. If `touched`, the cart stands at twice the stroke and presses the limiter.
     """
     settings = CheckSettings.current()
     flank = np.zeros((stages.count, len(stages.kernel.states)))

@@ -1,6 +1,6 @@
 """Measure many runs at once, from their turning points and statistics.
 
-This module is part of the interface of `friso.hunting` for other floors.
+Packages outside `friso.hunting` may import from this module.
 """
 
 from __future__ import annotations

@@ -86,7 +86,8 @@ class Prior:
     def masses(self, log: Log) -> tuple[float, float]:
         """Return the assumed mass [kg] of the cart and of the stage, 0 if not known.
 
-        Raises InputError for a [setup] that the stage does not take.
+        Estimates from earlier experiments replace the stage's values. Raises InputError if the log's [setup] makes a
+        change that the stage does not allow.
         """
         believed = self.believed(log)
         return float(believed.get("masses.cart", 0.0)), float(believed.get("masses.stage", 0.0))

@@ -127,9 +127,9 @@ class Question:
 
     @cached_property
     def function(self) -> Callable[..., Any]:
-        """Return the function, and import what it needs.
+        """Return the function that answers the question; its module is imported at first use.
 
-        Raises InputError if the module of another package has none.
+        Raises InputError if an installed package's module cannot be imported, or lacks the function or its docstring.
         """
         if self.package.startswith("friso."):
             return getattr(import_module(self.module), self.in_python)

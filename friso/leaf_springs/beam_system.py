@@ -65,7 +65,7 @@ class LeafBeams:
         return np.array([self._stiffness(leaf) for leaf in state])
 
     def mass(self) -> np.ndarray:
-        """Return the mass of an undeflected leaf, shape (6 nodes, 6 nodes)."""
+        """Return the mass matrix of an undeflected leaf, shape (6 * nodes, 6 * nodes)."""
         self._move(np.zeros((self.nodes, COORDINATES)))
         self._solver.ComputeMassMatrix(self._system)
         return np.array(self._solver.GetSystemMassMatrix())

@@ -36,13 +36,14 @@ Certainty = Literal["works", "large moves", "unsure", "given up", "does not work
 
 @dataclass(frozen=True)
 class Performance:
-    """How a stage performs on machines, as arrays with a single row.
+    """Performance of a stage's settings on machines that were drawn around it.
 
-    It holds `moves`, modulus margins, and whether the machines hunt. `own_margin` is the least modulus margin of the
-    stage itself in all settled states, and `stiffness` [N/m] its stiffness against a load. For `further` machines,
-    shape (n,), only whether they meet the whole goal is stored. `sizes` [m] are the moves of all machines, the further
-    ones last, drawn from the range `moves_drawn`. Before the performance `is_surveyed`, it is unknown which machines
-    hunt.
+    `moves`, `margin` (modulus margins) and `attraction` (which machines hunt) have one row, with a column per machine.
+    Until `is_surveyed` is true, it is unknown which machines hunt.
+
+    `own_margin` is the least modulus margin of the stage itself in all settled states. `stiffness` [N/m] is its
+    stiffness against a load. For `further` machines, shape (n,), only whether they meet the whole goal is stored.
+    `sizes` [m] are the moves of all machines, the further ones last; they were drawn from `moves_drawn`.
     """
 
     moves: Moves
@@ -81,11 +82,11 @@ class Performance:
         return float(np.median(self.moves.settling))
 
     def force(self, goal: Goal) -> float:
-        """Return the force [N] that 95 % of the machines do not exceed."""
+        """Return the force [N] that the fraction `goal.share` of the machines does not exceed."""
         return float(quantile(self.moves.force, goal.share)[0])
 
     def least_margin(self, goal: Goal) -> float:
-        """Return the modulus margin that 95 % of the machines keep."""
+        """Return the modulus margin that the fraction `goal.share` of the machines keeps."""
         return float(-quantile(-self.margin, goal.share)[0])
 
     def meets(self, goal: Goal) -> Mapping[str, np.ndarray]:

@@ -36,7 +36,10 @@ class Levels:
 
     @property
     def keys(self) -> dict[str, float]:
-        """Return the levels as keys of the stage file, with asymmetries only where they are not 0."""
+        """Return the parameters by key of the stage file, such as friction.static, in SI.
+
+        Asymmetries are included only where they are not 0.
+        """
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {f"friction.{name}": value for name, value in values.items() if value or "asymmetry" not in name}
 

@@ -22,11 +22,14 @@ class Crossing(NamedTuple):
 
 
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
-    """Fit a cubic to values over places, shape (n,); return its last zero along their trend.
+    """Fit a cubic to values over places, shape (n,), and return where it passes zero.
 
-    The error is twice the shift of the zero by the scatter of the values, or the distance to another zero of the cubic.
-    Returns None if there are too few values, if the cubic does not pass zero, or if the error exceeds half of the range
-    of places.
+    A zero counts only where the cubic rises or falls as a straight line through the values does. The last zero that
+    counts is returned. Its error is twice its shift by the scatter of the values, or the distance to the farthest other
+    zero, if larger.
+
+    Returns None if there are too few values, or no zero counts among the places. Returns None as well if the error
+    exceeds half of the range of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None

@@ -304,8 +304,9 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    The amplitude of a cycle lies in a certain ratio to the fall of friction with speed that feeds it
-    (`feeding_ratio_range`). It is stable where friction falls more slowly than cycles grow.
+    A cycle needs a fall of friction with speed, at a ratio to its amplitude within `feeding_ratio_range`. Small cycles
+    are possible where this ratio falls as swings grow, and meets that range. They are possible, too, where friction
+    falls so little that the survey may miss cycles, but steeply enough to feed one.
     """
     settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)

@@ -86,10 +86,11 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
 
 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
-    """Return the distances [m] covered from each turning point to the next.
+    """Return the distances [m] covered since the last turning point, for each stretch.
 
-    A reversal by less than `swing` [m] is no turn. Samples at which inertia outweighs friction are NaN, because the
-    force does not show the bristles there.
+    A stretch runs from one turning point to the next, and has one distance per sample. A reversal by less than `swing`
+    [m] is no turning point. Distances are NaN at samples where inertia outweighs friction, because the force does not
+    show the bristles there. `mass_per_force` is the mass over the Coulomb friction [kg/N].
     """
     ends = np.unique([0, *turns_of(position, swing)])
     calm = mass_per_force * np.abs(moved.acceleration) < OutputErrorSettings.current().friction_share_of_inertia

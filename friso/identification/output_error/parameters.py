@@ -28,8 +28,8 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 class FitParameter:
     """A parameter of the fit with its SI unit, start value and range.
 
-    The fitted number is the logarithm of a `logarithmic` parameter, otherwise its value. Any motion shows a `core`
-    parameter; all others are examined one by one.
+    The fitted number is the logarithm of a `logarithmic` parameter, otherwise its value. Every motion determines a
+    `core` parameter. For each of the others, the fit tests whether this motion determines it.
     """
 
     name: str

@@ -214,7 +214,8 @@ class Problem:
     def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
         """Compute the force [N] of the controller from the states at the samples, shape (runs, n).
 
-        The stage's own controller counts in a closed loop, otherwise the guiding controller.
+        In a closed loop this is the stage's own controller. Otherwise it is the controller by which friso guides the
+        stage along the logged position.
         """
         count = runs.states.shape[1]
         if not self.closed:

@@ -66,9 +66,11 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Widen deviations to the upper end of intervals that are symmetric in the logarithm.
+    """Widen standard deviations until their intervals reach the upper end of logarithmic ones.
 
-    An interval of half a value each way in the logarithm reaches 0.65 of the value above and 0.4 below.
+    An interval symmetric in the logarithm is not symmetric in the value. If it reaches 0.5 each way, its ends lie 65 %
+    above the value and 39 % below. For the upper end, relative deviations above 1 count as 1. No deviation becomes
+    smaller.
     """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)

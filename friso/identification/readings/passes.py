@@ -159,7 +159,10 @@ def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
 
 
 def _digit(position: np.ndarray) -> float:
-    """Return the resolution [m] of a position, if all its steps are multiples of one; else 0."""
+    """Return the resolution [m] of a position: the smallest step, if all are multiples of it.
+
+    Otherwise, and for a position that never changes, the result is 0.
+    """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(position))
     steps = steps[steps > settings.rounding_of_a_step * steps.max(initial=0.0)]

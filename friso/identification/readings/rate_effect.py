@@ -44,7 +44,10 @@ def static_friction(
 ) -> Estimate:
     """Estimate static friction [N] from break-away forces [N] at force rates [N/s], shape (n,).
 
-    Rates that spread are extrapolated to 0; otherwise the interval reaches up to what `share_below` allows.
+    Rates that differ enough are extrapolated to 0. Otherwise the upper end of the interval allows for the most that
+    break-away may lie below static friction (`share_below`). Static friction stays unknown with fewer than 3 forces, or
+    if the rates do not show it.
+
     `relative_error` is a standard deviation common to all forces, such as that of a stiffness. Forces may be up to
     `late` [N] too high, because they were read after the break-away.
     """

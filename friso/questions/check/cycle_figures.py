@@ -23,7 +23,10 @@ _WORDS = {True: "attracts", False: "repels"}
 
 
 def return_map_figure(cases: list[ShownCase]) -> Figure:
-    """Draw how far each swing reaches against the one before, with the swings of this motion."""
+    """Draw how far each swing reaches against the one before, in one panel per case.
+
+    A thin line shows the swings of the stage's own motion. A case whose swings were not followed has no panel.
+    """
     panels = tuple(panel for item in cases for panel in _return_map(item))
     caption = (
         "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "

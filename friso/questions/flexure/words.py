@@ -70,7 +70,10 @@ def assumptions(stage: Stage) -> list[str]:
 
 
 def _joint(evaluation: Evaluation) -> str:
-    """Describe the leaves, their stiffness, their drive mode and the force at full stroke."""
+    """Describe the leaves, their stiffness and force, and the stage's frequency on them.
+
+    All are along the motion, with the cart held. The force is given at full stroke, with its deviation from linear.
+    """
     mechanism, drive = evaluation.mechanism, evaluation.modes[0]
     return (
         f"The joint: {mechanism.leaves:g} leaves of {_size(mechanism.length)} x {_size(mechanism.width)} x "

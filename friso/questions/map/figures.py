@@ -103,7 +103,11 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 
 
 def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
-    """Return the curve over two axes that separates cells in which hunting attracts from others."""
+    """Return the curve that separates cells in which hunting attracts from the others.
+
+    `metric` names the verdicts. The result is empty for other metrics, for an axis with words or a single cell, and if
+    all cells are on one side.
+    """
     colouring = look(runs, metric)
     codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
     return _edges(x, y, colouring, codes)

@@ -153,7 +153,7 @@ def _finite(values: Iterable[float] | Array) -> Array:
 
 
 def _axis(axis: Axis, factor: float, unit: str) -> Axis:
-    """Return an axis with its limits and its unit prefixed."""
+    """Return an axis with a prefixed unit, such as mm, and its limits and step times `factor`."""
     limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
     step = None if axis.step is None else axis.step * factor
     return replace(axis, unit=unit, limits=limits, step=step)

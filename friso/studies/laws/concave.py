@@ -56,9 +56,10 @@ _SLOPES = np.array([1.0, 2.0])
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return the values at x, (m,), of parts of both kinds with end value 1; shape (m, 2 n).
+    """Return the parts of a concave curve at x, (m,), each with end value 1; shape (m, 2 n).
 
-    Below 0, where noise may lead, the parts continue straight.
+    The first n columns are straight up to their knot. The other n are bent, so that their slope falls to 0 at their
+    knot. Below x = 0, where noise may lead, all parts continue straight.
     """
     reached = np.minimum(x[:, None] / knots, 1.0)
     return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])

@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Remark:
-    """A remark on a claim.
+    """A remark on a claim, made only if one criterion of the claim turns out as expected.
 
-    It has the text, and the number of the criterion (from 0) that supports it. `met` tells whether that criterion must
-    be met, or not met, for the remark to apply. The command shows more.
+    `part` is the number of the criterion, from 0. If `met` is true, the remark applies where the criterion is met,
+    otherwise where it is not met.
     """
 
     claim: str

@@ -237,10 +237,10 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flat_of(values: GroupValues, scale: GroupScale = _UNIT) -> dict[str, Any]:
-    """Return keys [SI] of stages that have these groups; the inverse of `values_of`.
+    """Return stages with these dimensionless groups, as keys [SI]; the inverse of `values_of`.
 
-    The stages are rigid, or have a free joint if `joint` is among the groups. `scale` sets the units that groups leave
-    open.
+    The stages are rigid, or have a free joint if `joint` is among the groups. `scale` gives the mass, stiffness and
+    force that the groups leave open.
     """
     mass, stiffness, force = scale.mass, scale.stiffness, scale.force
     impedance = np.sqrt(stiffness * mass)

@@ -80,7 +80,10 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return a stage's groups as arrays of one shape, and its mass's frequency on bristles [Hz]."""
+    """Return a stage's dimensionless groups, and the natural frequency [Hz] on its bristles.
+
+    The groups are arrays of one shape. The frequency belongs to cart and stage together on the bristle stiffness.
+    """
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
     arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))

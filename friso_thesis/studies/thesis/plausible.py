@@ -150,7 +150,9 @@ def plausible(
 ) -> Plausible:
     """Judge the claims for `draws` random choices of the values that the thesis leaves open.
 
-    friso's own choice is computed as one more, for the best fit.
+    Claims on linear analysis or experiments are judged in one of `EVERY` draws. Claims on maps and responses alone are
+    also judged at friso's own choice, which may be the best fit. `kept` has saved findings, and `tally` counts the
+    progress.
     """
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}

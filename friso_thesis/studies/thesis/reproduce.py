@@ -204,8 +204,8 @@ def _by_attraction(
 ) -> Finding | None:
     """Judge a claim by what attracts the stages of its maps, instead of by counted peaks.
 
-    The result is None for a claim without maps, a claim on runs, and a claim on paths alone, on which attractors do not
-    depend.
+    Returns None for a claim without maps, for a claim about runs alone, and if a map was not surveyed. Returns None as
+    well if all its maps vary only the motion, on which attractors do not depend.
     """
     maps = entry.needs & STUDIES.keys()
     if entry.of_runs or not maps or not maps <= surveyed.keys() or all(STUDIES[name].of_motion for name in maps):

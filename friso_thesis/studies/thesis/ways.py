@@ -26,8 +26,8 @@ whatever the move."""
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
     """Return the runs with the numbers that judges read, by the thesis's peak count.
 
-    They are whether a peak is counted, and how many are. Further, there are the final swing over the height from which
-    peaks count, and whether the run still swings at its end (`lasts`).
+    `keeps_moving` tells whether a peak is counted, and `count` how many are. `size` is the final swing, peak to peak,
+    divided by the height above which peaks count. `lasts` tells whether the run still swings at its end.
     """
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),

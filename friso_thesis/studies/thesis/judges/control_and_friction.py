@@ -70,9 +70,9 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 
 
 def smallest_gap(evidence: Evidence) -> float:
-    """Return the smallest gap F_s - F_c [N] at which runs keep moving, for any Coulomb friction.
+    """Return the smallest gap F_s - F_c [N] at which a run keeps moving, over all values of F_c.
 
-    NaN if no run keeps moving.
+    Limits in F_s are interpolated. Returns NaN if no run keeps moving.
     """
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["friction"]
