@@ -79,8 +79,8 @@ class Reduced:
 def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Return torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends.
 
-    Elements are cubic, and rates of twist at inner nodes follow statically. Beams lack warping, which matters more for
-    modes than for statics.
+    Both matrices have the shape (nodes, nodes). Elements are cubic; rates of twist at inner nodes are those of static
+    equilibrium. Beams lack warping, which matters more for modes than for statics.
     """
     h = float(mechanism.length) / (nodes - 1)
     rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
@@ -159,7 +159,10 @@ def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.
 
 
 def end_motions(offsets: np.ndarray) -> np.ndarray:
-    """Return the motion of the leaves' stage ends per small motion of the stage, (leaves, 6, 6)."""
+    """Return the motion of the leaves' stage ends per small motion of the stage, (leaves, 6, 6).
+
+    `offsets` [m], shape (leaves,), are the places of the leaves along z.
+    """
     ends = np.tile(np.eye(COORDINATES), (len(offsets), 1, 1))
     ends[:, 0, 4], ends[:, 1, 3] = offsets, -offsets
     return ends
@@ -176,7 +179,8 @@ def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 def _rows(offsets: np.ndarray) -> np.ndarray:
     """Return orthonormal patterns of motion among the leaves, one in each row.
 
-    The first is uniform, the second linear in the position of the leaf, and the rest complete the set.
+    The first is uniform, the second linear in the position of the leaf, and the rest complete the set. `offsets` [m],
+    shape (leaves,), are the places of the leaves along z.
     """
     powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
     return np.linalg.qr(powers)[0].T

@@ -57,11 +57,11 @@ class LeafBeams:
         self._solver.InitializeSolver(self._system, settings)
 
     def forces(self, state: np.ndarray) -> np.ndarray:
-        """Return the forces and moments [N, N m] that hold the nodes in this state."""
+        """Return the forces and moments [N, N m] that hold the nodes in a state, (leaves, nodes, 6)."""
         return -np.array([self._forces(leaf) for leaf in state]).reshape(state.shape)
 
     def stiffness(self, state: np.ndarray) -> np.ndarray:
-        """Return the tangent stiffness of each leaf in this state, shape (leaves, 6 nodes, 6 nodes)."""
+        """Return the tangent stiffness of each leaf in a state, (leaves, 6 * nodes, 6 * nodes)."""
         return np.array([self._stiffness(leaf) for leaf in state])
 
     def mass(self) -> np.ndarray:
@@ -127,9 +127,9 @@ class Configuration:
 class Condensed:
     """The leaves condensed onto the stage: their inner nodes are eliminated.
 
-    `follow` (leaves, inner coordinates, 3) tells how inner nodes move with the stage, and `settle` (leaves, inner
-    coordinates) how they move under forces that are out of balance. `force` (3,) and `stiffness` (3, 3) are what
-    remains at the stage.
+    `follow` (leaves, inner coordinates, 3) tells how inner nodes move with the stage. `settle` (leaves, inner
+    coordinates) tells how they move under forces that are out of balance. `force` (3,) and `stiffness` (3, 3) act on
+    the stage.
     """
 
     follow: np.ndarray
@@ -144,8 +144,8 @@ class Condensed:
         """Condense the stiffness of the leaves and the forces on their nodes onto the stage.
 
         Of each node, the coordinates `which`, `which` + 2 and `which` + 4 are used. `ends` (leaves, 3, 3) tells how the
-        leaf ends follow the stage. `bend` tells at which coordinate their path is curved, and which moment [N m] the
-        forces exert there.
+        leaf ends follow the stage. If the stage turns, the leaf ends move along arcs. `bend` has the index of this
+        rotation, and the stiffness [N m/rad] that the forces at the ends add to it.
         """
         matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)
@@ -209,7 +209,10 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def _inside(h: float, middles: np.ndarray) -> np.ndarray:
-    """Return points for integrals over elements, shape (elements, 4)."""
+    """Return four integration points [m] in each element, shape (elements, 4).
+
+    Elements of length `h` [m] have their `middles` [m], shape (elements,), counted from the middle of the leaf.
+    """
     return middles[:, None] + _POINTS * h / 2
 
 
@@ -229,11 +232,13 @@ def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
 def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """Return the torsional compliance of elements relative to a plain beam, shape (elements,).
 
-    It follows `plate.free_twist`, so that a constant torque meets the stiffness of the plate. It is tilted so that the
-    torque of a force across the deflected leaf, s^3, meets it too.
+    Under a constant torque, the leaf then has the stiffness of the plate (`plate.free_twist`). The compliance is also
+    tilted along the leaf. The stiffness of the plate then holds, too, under the torque s^3 that a force across the
+    deflected leaf adds, with s from -1 to 1.
 
-    In an element this torque is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
-    (found by comparison; 1/n^2 errors of the stiffness along y vanish).
+    At the middle of an element of length h, in half lengths of the leaf, this torque is s^3 + s h^2/2. The reason is
+    that elements of constant strain represent the curved leaf as arcs (found by comparison; 1/n^2 errors of the
+    stiffness along y vanish).
     """
     s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
     even = (

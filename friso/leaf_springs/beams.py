@@ -24,7 +24,7 @@ PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 
 @dataclass(frozen=True)
 class HeldEquilibrium:
-    """Equilibrium with the stage held at z.
+    """Equilibrium of leaves and stage with the stage held at a deflection z.
 
     `place` is the configuration, and `rate` its change per z. `force` [N] holds the stage along z, and `stiffness` (6,
     6) is the tangent stiffness of the stage.
@@ -37,9 +37,9 @@ class HeldEquilibrium:
 
 
 def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Evaluation:
-    """Evaluate the mechanism at 5 deflections up to the stroke [m].
+    """Evaluate the mechanism at even deflections up to the stroke [m], 5 by default.
 
-    Raises BeamFailure where it has no solution.
+    Raises BeamFailure where the mechanism has no equilibrium, or has numbers that are not positive.
     """
     _check(mechanism, stroke)
     try:
@@ -53,7 +53,10 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
 
 
 def _check(mechanism: Mechanism, stroke: float) -> None:
-    """Raise BeamFailure for numbers that make no mechanism."""
+    """Check that dimensions, material and stroke [m] are positive and finite.
+
+    Raises BeamFailure for the first that is not.
+    """
     dimensions = {name: getattr(mechanism, name) for name in ("length", "width", "thickness", "young", "density")}
     dimensions |= {"leaves": mechanism.leaves, "mass of the stage": mechanism.body.mass, "stroke": stroke}
     for name, value in dimensions.items():
@@ -159,7 +162,8 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 class LinearisedLeaves:
     """A configuration linearised in the plane of motion.
 
-    `change` leads to equilibrium at the same z, `energy` is that of the change, and `force` [N] then holds the stage.
+    `plane` has the leaves condensed onto the stage. `change` leads to equilibrium at the same z, `energy` [J] is the
+    work of the unbalanced forces on it, and `force` [N] then holds the stage.
     """
 
     plane: Condensed
@@ -171,7 +175,10 @@ class LinearisedLeaves:
 def _condensed(
     mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray
 ) -> LinearisedLeaves:
-    """Condense stiffness of the leaves and forces on their nodes onto the stage."""
+    """Linearise a configuration, with stiffness of the leaves and forces on their nodes.
+
+    `stiffness` and `forces` belong to this configuration, `place`.
+    """
     offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 2], ends[:, 1, 2] = np.cos(turn) * offsets, -np.sin(turn) * offsets

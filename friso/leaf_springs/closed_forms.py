@@ -30,9 +30,9 @@ theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both cla
 
 
 def drive_stiffness(mechanism: Mechanism) -> Any:
-    """Return the stiffness along the motion while the stage stays parallel.
+    """Return the stiffness along the motion [N/m] while the stage stays parallel.
 
-    It is n 12 E I/L^3, stiffened as a plate.
+    It is 12 E I/L^3 for each leaf, times the factor by which a plate is stiffer than a beam.
     """
     beam = 12 * mechanism.young * mechanism.bending / mechanism.length**3
     return mechanism.leaves * beam * plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
@@ -109,9 +109,9 @@ def shortening(mechanism: Mechanism, deflection: Any) -> Any:
 
 
 def buckling_load(mechanism: Mechanism) -> Any:
-    """Return the load along all leaves together at which the stage sways.
+    """Return the load [N] along all leaves together at which the stage sways.
 
-    It is n pi^2 E I/L^2, stiffened as a plate.
+    It is pi^2 E I/L^2 for each leaf, times the factor by which a plate is stiffer than a beam.
     """
     return (
         mechanism.leaves
@@ -124,9 +124,9 @@ def buckling_load(mechanism: Mechanism) -> Any:
 
 
 def leaf_bending(mechanism: Mechanism) -> Any:
-    """Return the frequency of the first bending mode of a leaf between its clamps.
+    """Return the frequency [Hz] of the first bending mode of a leaf between its clamps.
 
-    It is 1.028 t/L^2 sqrt(E/rho), stiffened.
+    It is 1.028 t/L^2 sqrt(E/rho), raised because a plate is stiffer than a beam.
     """
     beam = (
         CLAMPED**2
@@ -137,10 +137,10 @@ def leaf_bending(mechanism: Mechanism) -> Any:
 
 
 def _mode_stiffening(mechanism: Mechanism) -> Any:
-    """Return the plate's stiffening for moments that change sign along the leaf, as in a mode.
+    """Return the factor by which a plate is stiffer than a beam in its bending modes.
 
-    The value for parallel motion is used. The even share of the moments lies far from the clamps and has little
-    influence.
+    The factor for parallel motion is used, whose moments change sign along the leaf. In a mode, moments of equal sign
+    occur mainly far from the clamps and have little influence.
     """
     return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
 
@@ -161,7 +161,7 @@ def leaf_torsion(mechanism: Mechanism) -> Any:
 
 
 def lateral_load(mechanism: Mechanism) -> Any:
-    """Return the force along the leaves' width at which they give way sideways.
+    """Return the force [N] along the leaves' width at which they give way sideways.
 
     The force acts at the leaf ends, on all leaves together.
     """
@@ -248,7 +248,10 @@ def body_mass(mechanism: Mechanism) -> np.ndarray:
 
 
 def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
-    """Build symmetric matrices, shape (..., 6, 6), from entries on and above the diagonal."""
+    """Build symmetric matrices, shape (..., 6, 6), from entries by row and column.
+
+    The entries are on or above the diagonal; all others are 0.
+    """
     shape = np.broadcast_shapes(*(np.shape(entry) for entry in entries.values()), np.shape(mechanism.length))
     matrices = np.zeros((*shape, 6, 6))
     for (i, k), entry in entries.items():
@@ -257,11 +260,11 @@ def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.
 
 
 def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Return frequencies (..., 7), ascending, and mode shapes (..., 7, 7) of stage and leaves.
+    """Return frequencies [Hz], (..., 7), and mode shapes (..., 7, 7) of stage and leaves.
 
-    Shapes stand in columns at unit modal mass. Six coordinates are the stage's. The seventh is the first bending mode
-    of all leaves in phase, at its unit modal mass. Besides, the leaves follow the stage statically (Craig & Bampton
-    1968, doi:10.2514/3.4741). Numbers that make no mechanism give NaN.
+    Frequencies ascend. Shapes stand in columns at unit modal mass. Six coordinates are the stage's. The seventh is the
+    first bending mode of all leaves in phase, at its unit modal mass. Besides, the leaves follow the stage statically
+    (Craig & Bampton 1968, doi:10.2514/3.4741). Frequencies are NaN for numbers that make no mechanism.
     """
     mass, stiffness = stage_mass(mechanism), stage_stiffness(mechanism)
     mass, stiffness = (np.pad(matrix, [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]) for matrix in (mass, stiffness))

@@ -14,7 +14,7 @@ from friso.leaf_springs.settings import LeafSpringSettings
 
 
 def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
-    """Return the stiffness of the deflected stage [m] at its reference point, (6, 6).
+    """Return the stiffness (6, 6) of the stage at its reference point, at a `deflection` [m].
 
     The stage is kept parallel. Elasticity is linear about the deflected shape. The forces that hold the shape are too
     small to matter as long as they are small against the buckling load.
@@ -44,9 +44,10 @@ def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the section's compliance for each force and moment, (points, 6).
+    """Return the compliance of a leaf at points x [m], per force and moment, (points, 6).
 
-    Also returns the arc length, (points,).
+    Also returns the arc length, (points,), for which each point stands: its `weight` in the integral along x,
+    lengthened by the `slope` of the leaf. All arguments have the shape (points,).
     """
     s = x - mechanism.length / 2
     sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
@@ -71,9 +72,10 @@ def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndar
 def _resultants(
     mechanism: Mechanism, deflection: float, x: np.ndarray, height: np.ndarray, slope: np.ndarray
 ) -> np.ndarray:
-    """Return forces and moments at the points per unit load at the end, shape (points, 6, 6).
+    """Return forces and moments at points of a leaf per unit load at its end, (points, 6, 6).
 
-    They act along and about tangent, width and normal.
+    They act along and about tangent, width and normal. The points x [m] have the `height` [m] and the `slope` of the
+    deflected leaf, shape (points,).
     """
     cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
     turn = np.zeros((len(x), 3, 3))

@@ -41,10 +41,10 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class VisibleModes:
-    """Modes of mechanisms other than the drive mode, arrays of shape (..., 7).
+    """All modes of mechanisms except their drive mode, as arrays of shape (..., 7).
 
-    They hold the frequency [Hz], and the residue times the mass of the stage. A residue is positive where actuator and
-    sensor move in phase. Entries at the drive mode are 0. `visible` marks the modes that actuator and sensor both see.
+    `frequency` is in Hz; `residue` is the residue times the mass of the stage, positive where actuator and sensor move
+    in phase. Residues are 0 at the drive mode. `visible` marks the modes that actuator and sensor both see.
     """
 
     frequency: np.ndarray
@@ -53,7 +53,7 @@ class VisibleModes:
 
     @classmethod
     def of(cls, mechanism: Mechanism) -> VisibleModes:
-        """Compute the modes of mechanisms by closed forms."""
+        """Compute the modes by closed forms, and decide which of them are visible."""
         settings = LeafSpringSettings.current()
         frequency, shapes = closed_forms.modes(mechanism)
         motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
@@ -65,9 +65,9 @@ class VisibleModes:
         return cls(frequency, residue, np.abs(residue) > least)
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
-        """Return frequency [Hz] and residue, each (...), of the mode with number `mode` (...).
+        """Return frequency [Hz] and residue of the mode with number `mode`, all of shape (...).
 
-        They are infinite and 0 for a mechanism without a visible mode.
+        For a mechanism without any visible mode the frequency is infinite and the residue 0.
         """
         picked = [
             np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]

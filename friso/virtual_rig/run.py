@@ -155,7 +155,11 @@ def _recorded(
     timing: tuple[float, int, int | None],
     with_outputs: bool,
 ) -> RecordedRuns:
-    """Run a task on stages with their drive, and return the signals that the drive records."""
+    """Run a task on stages with their drive, and return the signals that the drive records.
+
+    `numbers` are the numbers of the runs. `timing` has the interval of the samples [s], the number of samples, and the
+    number of threads. All signals of the equations are added if `with_outputs`.
+    """
     settings = RigSettings.current()
     interval, count, threads = timing
     seeds = flat["drive.seed"].astype(np.int64)
@@ -194,7 +198,10 @@ def _recorded(
 def _outputs(
     shape: Kernel, samples: np.ndarray, values: list[np.ndarray], batch: Batch, interval: float, number: int
 ) -> dict[str, np.ndarray]:
-    """Return all signals of a run from its samples, by name, each of shape (samples,)."""
+    """Return all signals of a run from its samples, by name, each of shape (samples,).
+
+    `number` is the index of the run in the batch, and `interval` [s] the time between samples.
+    """
     time, states = np.arange(len(samples)) * interval, samples.T
     rows = batch.segments[min(number, len(batch.segments) - 1)]
     active = rows[np.searchsorted(rows[:, 0], time * (1 + 1e-12), side="right") - 1]
@@ -223,7 +230,10 @@ def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
 def _signals(
     shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: MoveTask, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return the signals that the drive logs, and the true ones, by role, shape (runs, n) each."""
+    """Return the signals that the drive logs, and the true ones, by role, shape (runs, n) each.
+
+    `samples`, shape (runs, n, states), are taken every `interval` [s]. `seeds` are those of the runs' noise.
+    """
     time = np.arange(samples.shape[1]) * interval
     position, reading, commanded = (
         samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))

@@ -38,7 +38,7 @@ def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
 def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
     """Return the places [m] at which tables have points, and the grid that they form, (1, 2).
 
-    The grid holds the first place [m] and the points per metre.
+    The places reach beyond the reference on both sides. The grid holds the first place [m] and the points per metre.
     """
     settings = RigSettings.current()
     low, high = task.span

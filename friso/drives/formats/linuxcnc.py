@@ -157,7 +157,11 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 
 
 def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
-    """Return the letter of a joint, such as X; "" if a letter has several joints."""
+    """Return the letter of the joint `name`, such as X; "" if its letter has several joints.
+
+    `letters` are those of all joints in order, and `counts` tells how many joints each letter has. An axis gives "",
+    too.
+    """
     number = int(name.partition("_")[2])
     is_named = name.startswith("JOINT") and number < len(letters) and counts[letters[number]] == 1
     return letters[number] if is_named else ""

@@ -44,7 +44,10 @@ AHEAD = (POSITION_FILTER, TRAJECTORY)
 
 
 def _symbols(modes: tuple[str, ...], *before: str) -> dict[str, float]:
-    """Return the number of each mode by the names that Python scripts use for it."""
+    """Return numbers by symbol, as Python scripts write them: `before` plus the name of a mode.
+
+    The number of a mode is its place in `modes`.
+    """
     return {f"{start}{name}": number for start in before for number, name in enumerate(modes)}
 
 
@@ -210,7 +213,10 @@ def _in_counts(name: str, value: str) -> InputError:
 
 
 def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
-    """Return the first parameter or symbol that reveals the firmware; "" if there is none."""
+    """Return the first parameter that only some versions of the firmware have; "" if none.
+
+    Its name, or the symbol that is its value, is among `names`.
+    """
     for key, value in axis.values.items():
         symbol = re.match("CTRL_MODE|CONTROL_MODE|ControlMode", value) if isinstance(value, str) else None
         if names & {key.rpartition(".")[2], ".".join(key.split(".")[:2]), symbol[0] if symbol else ""}:
@@ -219,7 +225,7 @@ def _sign_of(axis: AxisParameters, names: frozenset[str]) -> str:
 
 
 def _fastest(axis: AxisParameters) -> str:
-    """Return the name of a velocity limit too high for turns per second; "" if there is none."""
+    """Return the name of a velocity limit too high to be in turns per second; "" if none is."""
     limits = (f"{place}.vel_limit" for place in (CONFIG, MOVE))
     return next((key for key in limits if axis.is_set(key) and axis.number(key) > FASTEST), "")
 
@@ -352,7 +358,10 @@ def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Ma
 
 
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
-    """List in sentences the settings of the axis that a stage cannot describe."""
+    """List in sentences the settings of the axis that a stage cannot describe.
+
+    `mode` is the number of the axis's input mode. `limited` is true if the stage has a force limit.
+    """
     left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
     if IN_TURNS not in axis.values:
         left.append(

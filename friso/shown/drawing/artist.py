@@ -15,7 +15,10 @@ from friso.shown.drawing.matplotlib_renderer import image
 
 
 def drawn(asked: tuple[Figure, AxisKind, Sequence[Image]]) -> dict[Image, bytes]:
-    """Return the images of a figure, in the units of a kind of axis."""
+    """Return the images of a figure, in the units of a kind of axis.
+
+    `asked` holds the figure, the kind of axis, and the images that are wanted.
+    """
     figure, axis, images = asked
     with speaking_of(axis):
         return {wanted: image(figure, *wanted) for wanted in images}

@@ -52,7 +52,10 @@ class ColourScale:
 
 
 def painted(field: Coloured) -> Array:
-    """Return the numbers as drawn: z, or its logarithm, raised to the lower limit."""
+    """Return the numbers of a map or cloud to which the colours belong.
+
+    These are z, or on a logarithmic scale log10(z), with z raised to the lower limit.
+    """
     if not field.log:
         return field.z
     low, _ = _limits(field)

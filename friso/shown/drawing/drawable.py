@@ -107,7 +107,7 @@ def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
 
 
 def _panel(panel: Panel) -> Panel:
-    """Return a panel with prefixed axes, thinned lines, and limits as lines."""
+    """Return a panel as it is drawn: prefixed axes, thinned lines, and limits as lines."""
     limits = _finite([value for limit in panel.limits for value in limit.values])
     points = (*panel.series, *panel.markers, *panel.coloured)
     xs = _gather(panel.x, [item.x for item in (*points, *panel.bands)])
@@ -142,7 +142,10 @@ def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
 
 
 def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
-    """Return the factor and the prefixed unit that suit the values of an axis."""
+    """Return the factor and the prefixed unit that suit the values of an axis.
+
+    A value times the factor is in the prefixed unit.
+    """
     return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
 
 
@@ -168,7 +171,10 @@ def _thinned(line: Series) -> Series:
 
 
 def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
-    """Return all lines of a limit as one series, with gaps between them."""
+    """Return all lines of a limit as one series across `extent`, with gaps between them.
+
+    `extent` has the left and right end in the unit of x.
+    """
     x = np.array([*extent, np.nan] * len(limit.values))
     y = np.array([entry for value in limit.values for entry in (value, value, np.nan)])
     return Series(x, y, limit.label, limit.colour, limit.dash, width=1.0)
