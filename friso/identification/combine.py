@@ -22,7 +22,8 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     """Combine all estimates into one per key, and list disagreements in sentences.
 
     Estimates are weighted by their intervals; if some disagree, the interval is widened. Experiments that determine a
-    key override experiments that only bound it. If none determines the key, the common range of all remains.
+    key override experiments that only bound it. If none determines the key, the common range of all remains, or a range
+    that spans all if they have none in common.
     """
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):

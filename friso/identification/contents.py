@@ -57,7 +57,10 @@ class ChannelContent:
         return 1 / usual_step(steps) if steps.size else None
 
     def course(self) -> np.ndarray:
-        """Return means over successive parts of the channel, for a small plot; NaN without numbers."""
+        """Return the means of successive parts of the channel, for a small plot, shape (parts,).
+
+        The mean of a part without finite values is NaN.
+        """
         settings = IdentificationSettings.current()
         parts = np.array_split(self.values, min(settings.bins_of_a_small_plot, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]

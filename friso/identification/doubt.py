@@ -173,8 +173,8 @@ class FitCase(FittedCase):
     def reaching(self, moved: np.ndarray, further: Mapping[str, float] | None = None) -> OutputErrorFit:
         """Return the fit with intervals widened by the shift that an effect causes.
 
-        `moved` is the shift of the fitted numbers, shape (free,), and counts several times. `further` is added for some
-        parameters, by name.
+        `moved` is the shift of the fitted numbers, shape (free,); it is multiplied by a setting, `reach_of_an_effect`.
+        `further` widens the intervals of some parameters more, by name.
         """
         reach = DoubtSettings.current().reach_of_an_effect * np.abs(moved)
         return reaching_over(self.fit, reach + [(further or {}).get(name, 0.0) for name in self.fit.fitted])
@@ -182,8 +182,9 @@ class FitCase(FittedCase):
     def named(
         self, effect: LeadingEffect, words: str, size: float, unit: str, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return a finding that names an effect, widens intervals by its shift, refuses bristles.
+        """Return a finding that names an effect as the cause of the residual.
 
+        The finding widens intervals by the effect's shift, and withholds the bristles, which the effect can imitate.
         `words` name the effect, and `size` is in `unit`. `further` widens the intervals of some parameters more, by
         name.
         """
@@ -194,10 +195,10 @@ class FitCase(FittedCase):
     def named_along(
         self, effect: LeadingEffect, words: str, size: float, further: Mapping[str, float] | None = None
     ) -> RaisedDoubt:
-        """Return a finding on a force along the way; a small one only widens intervals, unnamed.
+        """Return a finding on a force that varies along the way.
 
-        `words` name the effect; `size` is in the unit of the force. `further` widens the intervals of some parameters
-        more, by name.
+        A force that is small against the whole force is not named: it only widens intervals. `words` name the effect;
+        `size` is in the unit of the force. `further` widens the intervals of some parameters more, by name.
         """
         finding = self.named(effect, words, size, self.unit, further)
         force = self.log["force"][self.log.longest]
@@ -298,14 +299,17 @@ DOUBTS: Registry[Doubt] = Registry("friso.identification.doubts", "DOUBT")
 def raised(moment: Moment, case: Any) -> Iterator[RaisedDoubt]:
     """Yield the findings of all doubts that are examined at a moment of the analysis, in order.
 
-    `case` is the argument of their `find` (`Moment`).
+    `case` is what the `find` of these doubts takes, such as a FitCase.
     """
     for name in _at(moment):
         yield from _named(name, case)
 
 
 def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
-    """Return, in words, the causes that the doubts of a moment of the analysis find, in order."""
+    """Return, in words, the causes that the doubts of a moment of the analysis find, in order.
+
+    `case` is what the `find` of these doubts takes, such as a FitCase.
+    """
     return tuple(finding.words for finding in raised(moment, case))
 
 
@@ -376,9 +380,10 @@ def judged_keys(case: KeyCase) -> KeyCase:
 
 
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
-    """Return estimates without a value, by key, for those that `reasons` withhold.
+    """Return the estimates that are withheld, by key, with the reason in place of the value.
 
-    `reasons` are by key. A withheld Coulomb friction keeps the interval of all dry friction at low speed.
+    `reasons` are by key; a key without a reason is not withheld. The range left to Coulomb friction reaches down to its
+    lower end divided by the highest ratio of static to Coulomb friction.
     """
     ratio = OutputErrorSettings.current().highest_friction_ratio
     return {

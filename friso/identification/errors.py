@@ -50,7 +50,10 @@ class Residual:
 
 
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
-    """Compare a simulated record with a part of a log; `bandwidth` [Hz] is the motion's."""
+    """Compare a simulated record with the samples `part` of a log.
+
+    `bandwidth` [Hz] is the motion's.
+    """
     settings = IdentificationSettings.current()
     measured = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * bandwidth)
     modelled = motion(simulated.position, log.sample_time, settings.smoothing_bandwidths * bandwidth)
@@ -64,9 +67,10 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the force that guides a stage along the logged position, over the logged force.
+    """Return the size of the force that guides a stage along a log, over the logged force.
 
-    The model leaves this force unexplained; `held` contains it. Errors of the motion are NaN.
+    `held` contains this force, which the model leaves unexplained; `part` are the samples. It stands as the error of
+    the force; errors of the motion are NaN.
     """
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)

@@ -238,7 +238,10 @@ def unit_of(unit: str, log: Log) -> str:
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
-    """Make an estimate from a coefficient and its variance (infinite if a direction is missing)."""
+    """Make an estimate from a coefficient and its variance.
+
+    The variance is infinite, and the value unknown, if the log lacks a direction.
+    """
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
     return Estimate.unknown(
@@ -247,7 +250,10 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Mark the rows, shape (rows,), that belong to a long stretch of slow motion."""
+    """Mark the rows that belong to a long stretch of slow motion, shape (rows,).
+
+    `slow` marks slow rows, and `time` [s] has their instants.
+    """
     settings = IdentificationSettings.current()
     ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
     rests = np.zeros(len(slow), bool)
@@ -271,7 +277,11 @@ _NAMES = {
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return filtered, decimated times, columns, forces and positions of a segment."""
+    """Return filtered, decimated times, columns, forces and positions of a segment.
+
+    `part` are its samples, and `band` [Hz] is the motion's bandwidth; the other arguments are those of `inverse_model`.
+    All results are empty for a segment too short to filter.
+    """
     settings = IdentificationSettings.current()
     if part.stop - part.start < 2 * settings.samples_of_an_edge:
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)

@@ -65,21 +65,21 @@ class Prior:
         """Return the stage for a log as flat keys such as friction.static, with SI values.
 
         Changes that the log's [setup] states are included. Returns {} without a stage. Raises InputError for changes
-        that the stage does not take.
+        that the stage does not allow.
         """
         return {} if self.stage is None else as_set_up(self.stage, log)
 
     def user_told(self, key: str, log: Log) -> bool:
         """Tell whether the user stated a key, in the stage file or in the log's [setup].
 
-        Raises InputError for a [setup] that the stage does not take.
+        Raises InputError if the [setup] makes a change that the stage does not allow.
         """
         return self.from_user and key not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
         """Return the stage for a log as flat keys, with the values that other experiments gave.
 
-        Raises InputError for a [setup] that the stage does not take.
+        Raises InputError if the log's [setup] makes a change that the stage does not allow.
         """
         return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
 
@@ -97,7 +97,7 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
     """Return a stage with the changes that a log's [setup] states, as flat keys with SI values.
 
     Keys that the stage does not have are left out (`left_out`), except for a controller of another form, which replaces
-    the stage's. Raises InputError for changes that the stage does not take.
+    the stage's. Raises InputError for changes that the stage does not allow.
     """
     setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
     changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
@@ -170,12 +170,19 @@ class ExperimentKind(Generic[Result]):
     failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
-        """Return the roles that a log needs, such as position, given the roles that it has."""
+        """Return the roles that a log needs, such as position, given the roles that it has.
+
+        Of alternatives, the first that the log has is returned, or else the last.
+        """
         choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 
     def groups(self, sources: Sequence[Source]) -> list[tuple[Source, ...]]:
-        """Group the logs of this kind by experiment."""
+        """Group the logs of this kind by experiment.
+
+        Logs are one group each, unless the kind analyses them `together`. Logs that show too little by themselves are
+        joined. Responses from another instrument are one group each, and left out if the kind does not accept them.
+        """
         times = tuple(source for source in sources if isinstance(source, Log))
         responses = [(source,) for source in sources if not isinstance(source, Log)] if self.responses else []
         if self.together:

@@ -15,7 +15,10 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
-    """Return a registry's names, each after all names in its `after`, else alphabetically."""
+    """Return the names in a registry, each after all kinds that its `after` names.
+
+    Otherwise they stand in alphabetical order.
+    """
     sorter = TopologicalSorter(
         {name: [other for other in registry[name].after if other in registry] for name in registry}
     )

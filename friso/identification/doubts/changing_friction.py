@@ -24,7 +24,7 @@ class RecordDrift:
     """How friction and a constant force change during a record, and what that shifts.
 
     `moved`, shape (free,), is the shift of the fitted numbers. `friction` and `constant` [N] are the changes over the
-    record; their reaches [N] are the largest deviations from the means.
+    record. `friction_reach` and `constant_reach` [N] are the largest deviations from the mean over the record.
     """
 
     moved: np.ndarray
@@ -100,7 +100,7 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
     """Return two shapes of change along a record, without their means, shape (n,) each.
 
     `share` is the fraction of the record's time. One shape rises to 1 in the middle and falls again; the other rises to
-    1 from the middle to the end.
+    1 from the middle to the end. `counted` weights the samples in the means.
     """
     shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
     return [shape - np.average(shape, weights=counted) for shape in shapes]

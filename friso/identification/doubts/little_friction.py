@@ -22,7 +22,11 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 
 
 def _sentence(case: ValueCase, value: float, least: float) -> str:
-    """Write the sentence on possible causes of little, or negative, friction."""
+    """Write the sentence on possible causes of little, or negative, friction.
+
+    `value` is the Coulomb friction of the inverse model, and `least` the size below which it counts as none, both in
+    the unit of the force.
+    """
     one, unit = case.inverse.estimate("coulomb"), case.unit
     if not one.determined:
         says, does = ("which helps the motion", "exceeds") if value <= -least else ("next to nothing", "may hide")

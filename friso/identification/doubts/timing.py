@@ -46,7 +46,7 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _doubling(most: float) -> list[int]:
-    """List the powers of two from 1 up to `most`."""
+    """List the powers of two from 1 up to `most`; [] if `most` is below 1."""
     return [2**power for power in range(int(np.log2(most)) + 1)] if most >= 1 else []
 
 

@@ -60,7 +60,10 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Return why logs hold force ramps, or None: they need enough in total, and some in each."""
+    """Return why logs hold force ramps from rest.
+
+    Returns None unless each has a ramp and all have enough together.
+    """
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
     return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None

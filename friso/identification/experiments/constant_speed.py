@@ -39,7 +39,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _stated_exponent(prior: Prior) -> float | None:
-    """Return the Stribeck exponent of the user's stage file, if stated without uncertainty."""
+    """Return the Stribeck exponent of the user's stage file; None if not stated or uncertain."""
     if prior.stage is None or not prior.from_user or EXPONENT in {*prior.made_up, *prior.stage.uncertain()}:
         return None
     return prior.stage.flat().get(EXPONENT)
@@ -78,7 +78,7 @@ def _partial(log: Log) -> bool:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Return why logs move at constant speeds, or None.
+    """Return why logs move at constant speeds, or None if they do not.
 
     Most of their motion must be at constant speeds, enough for a curve of friction over speed. At the slowest speeds a
     body may stick and slip, so logs in one direction count too.

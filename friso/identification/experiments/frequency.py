@@ -43,10 +43,11 @@ def _claims(course: Course) -> str | None:
 
 
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Return estimates of masses and joint from a two-mass model in newtons and metres.
+    """Return estimates of masses and joint from responses in newtons and metres.
 
-    If only the mass line shows, where the response falls as of one mass, the total mass is returned. A resonance nearer
-    to the parasitic mode than to the joint's mode gives no joint.
+    They are those of the two-mass model, if it was fitted. If only a mass line shows, where the response falls as of
+    one mass, its mass is the stage's or the total, whichever is nearer. A resonance nearer to the parasitic mode than
+    to the joint's mode leaves the joint's stiffness undetermined. The result is empty for other units.
     """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
@@ -78,7 +79,10 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return a resonance [Hz] that is the stage's parasitic mode, not its joint's mode, or None."""
+    """Return the model's resonance [Hz] if it is nearer to the parasitic mode than to the joint.
+
+    Returns None otherwise, and for a stage without a joint or a parasitic mode.
+    """
     flat = stage.flat()
     if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
         return None

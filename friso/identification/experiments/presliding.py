@@ -167,7 +167,11 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
-    """Make the estimate of mass, damping or stiffness, which must be positive."""
+    """Make the estimate of mass, damping or stiffness, all of which must be positive.
+
+    `error` is the standard error, to which `systematic` is added. The quantity is not determined if its interval
+    reaches 0.
+    """
     settings = ReadingSettings.current()
     estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
     if estimate.low > 0:
@@ -216,7 +220,10 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
 
 
 def _apart(columns: np.ndarray, number: int) -> float:
-    """Return the norm of the part of a column that the other columns, (m, p), do not explain."""
+    """Return the norm of the part of a column that the other columns do not explain.
+
+    The column has the index `number` in `columns`, shape (m, p).
+    """
     sizes = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(sizes > 0, sizes, 1.0)
     others = np.delete(scaled, number, axis=1)
@@ -239,7 +246,7 @@ class _Equation:
     rest: tuple[np.ndarray, ...]
 
     def columns(self, bending: float) -> np.ndarray:
-        """Return the columns of bristles of a bending q [1/m] and all others, shape (m, p).
+        """Return all columns of the fit for bristles with a bending q [1/m], shape (m, p).
 
         Columns are inertia, rate and deflection of the bristles, the decay of an initial deflection, then the fixed
         columns.

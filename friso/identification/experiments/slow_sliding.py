@@ -168,7 +168,10 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
-    """Return copies of the prior values, each with one quantity at the end of its interval."""
+    """Return copies of the prior values, each with one quantity at its interval's upper end.
+
+    The quantities are mass, stiffness and damping of the bristles, and viscous friction.
+    """
     doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
@@ -213,7 +216,10 @@ def _equation(
 
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
-    """Return the best fit from several starts, shape (5,)."""
+    """Return the numbers of the best fit from several starts, shape (5,).
+
+    A start may leave out its last numbers, which then begin at 0.
+    """
     settings = ExperimentSettings.current()
     least, most = settings.sliding_bounds
     low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
@@ -263,7 +269,10 @@ def _estimates(
 
 
 def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """Withdraw estimates that the motion does not determine, with the reason."""
+    """Withdraw estimates that the motion does not determine, with the reason.
+
+    `left` is the unexplained fraction of the friction; `velocity` [m/s], shape (n,), is the body's.
+    """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
@@ -289,7 +298,10 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
-    """Return mass and bristles from other experiments, or None."""
+    """Return mass and bristles from other experiments.
+
+    Returns None unless these gave all masses, and stiffness and damping of the bristles.
+    """
     flat = prior.flat(log)
     masses = [key for key in flat if key.startswith("masses.")]
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]

@@ -142,7 +142,8 @@ def _settled_window(
     """Return the part of a plateau that has settled; None without one.
 
     In the settled part the deflection hardly drifts, and the force drifts no more than in proportion, apart from noise
-    or a fraction of a step.
+    or a fraction of a step. `span` are the samples of the plateau, `scale` [m] is the usual step, and `secant` [N/m] a
+    rough stiffness.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     length = span.stop - span.start
@@ -165,7 +166,10 @@ def _settled_window(
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:
-    """Return the mean of a window, and its drift beyond two standard errors."""
+    """Return the mean of a window, and its drift from beginning to end beyond the noise.
+
+    The noise counts as four standard errors of the mean; the drift is 0 if it is smaller.
+    """
     mean = block_mean(values)
     shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
     return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
@@ -173,6 +177,9 @@ def _drifting(values: np.ndarray) -> tuple[Mean, float]:
 
 def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
     """Estimate the stiffness by a line through the origin: changes of force over deflection.
+
+    `steps` has these changes, deflection in the first column; `noise` [N] is that of each change. Only `chosen` steps
+    count, described by `words`; the stiffness is unknown with fewer than two. `plateaus` is mentioned in the reason.
 
     Neighbouring changes share a window, so the largest of three variances counts: for independent changes (drifting
     force), for changes of independent windows (noise), and by the noise within windows.
@@ -215,7 +222,10 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
 
 
 def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
-    """Tell whether the cart stood still between the windows, with notes."""
+    """Tell whether the cart stood still between the windows, with notes.
+
+    The first result is None if no channel shows the cart, or with fewer than two windows.
+    """
     moved = cart(log)
     if moved is None:
         return None, ("The cart is assumed fixed: no channel shows whether it is.",)

@@ -173,11 +173,14 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
 def _peak(
     pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
 ) -> tuple[int, float, float, float, bool]:
-    """Find the peak of the pull between the onset of visible motion and top speed.
+    """Find the peak of the force on the cart, `pull`, between the start of a slip and top speed.
 
-    Returns the peak's sample and height, the pull at the onset, the rate at which the pull rose over the last third of
-    the rest, and whether it had stopped rising: it stayed within a hundredth of the peak for several times as long as
-    its usual rate and the filter take.
+    `pull` [N] is positive in the direction of the slip. `marks` are samples: the beginning of the rest, the onset of
+    visible motion, the start of the slip, and top speed. Returns the peak's sample and height, the pull at the onset,
+    and the rate of the pull over the last third of the rest.
+
+    The last result is true if the pull had stopped rising. It then stayed within a hundredth of the peak for several
+    times as long as its usual rate and the filter take.
     """
     settings = ExperimentSettings.current()
     rest, onset, start, top = marks
@@ -219,7 +222,11 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
-    """Make the result of the analysis from the table of all slips."""
+    """Make the result of the analysis from the `table` of all slips, one row per quantity.
+
+    `why` says why a direction may have no slips. Static friction has only a lower bound if, before most slips, the pull
+    had stopped rising or the joint was at its stroke.
+    """
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
 
@@ -278,7 +285,10 @@ def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
 
 
 def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
-    """Return the mean break-away force of one direction."""
+    """Return the mean break-away force of one direction, named `name`.
+
+    It is not determined with fewer than two slips; `why` says why there are none.
+    """
     method = "mean of the peaks of the force on the cart before slips"
     if len(forces) < 2:
         return Estimate.unknown(name, "N", method, f"{len(forces)} slips: {why}" if not len(forces) else "1 slip")
@@ -311,7 +321,10 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 
 
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
-    """Return half of the difference between forward and backward break-away force."""
+    """Return half of the difference between forward and backward break-away force.
+
+    It is not determined if the cart slips in one direction only.
+    """
     name, method = (
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",

@@ -53,7 +53,7 @@ class LawComparison:
     """The friction laws, ranked by their prediction of logs, the best first.
 
     `logs` are the names of the logs used, `left_out` has the reason for each other log by its name, and `parts` counts
-    the predicted parts. `unseen` tells whether fits started from the stage before any log.
+    the predicted parts. `unseen` is true if fits started from the stage as it was before any log.
     """
 
     predictions: tuple[LawPrediction, ...]
@@ -80,11 +80,11 @@ class LawComparison:
 
 
 def _worse(differences: np.ndarray, level: float) -> bool:
-    """Tell whether errors, shape (parts,), exceed those of another law by more than chance.
+    """Tell whether a law's errors exceed those of the best law by more than chance.
 
-    Two tests are made, at half the `level` each: of the mean difference, and of the signs of the differences. The mean
-    difference must also exceed the setting below which laws count as equal. A law that could not be run for a part is
-    worse.
+    `differences`, shape (parts,), are by part of the record. Two tests are made, at half the `level` each: of the mean
+    difference, and of the signs of the differences. One of them suffices; the mean, or the median for the signs, must
+    also exceed the setting below which laws count as equal. A law that could not be run for a part is worse.
     """
     settings = LawSettings.current()
     if not np.isfinite(differences).all():
@@ -140,7 +140,10 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
-    """Read the logs as records; return the reasons why other logs cannot be used."""
+    """Read the logs as records of a dragged body.
+
+    Also returns, by name of the log, why others cannot be used.
+    """
     records, left_out = [], {}
     for log in logs:
         if not {"position", "force"} <= {*log.signals}:
@@ -155,7 +158,10 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
-    """Fit a law to all records and to all but each part in turn, and predict that part."""
+    """Fit a law to all records, and then without each part in turn, which it predicts.
+
+    `parts` has, for each part, a mask of the samples of every record. The error of a part is infinite if the run fails.
+    """
     starts = problem.everywhere()  # starts exclude the fit to all records, which has seen the left-out part
     whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []

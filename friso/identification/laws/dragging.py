@@ -83,9 +83,10 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 
 
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
-    """Choose the parts to leave out in turn, by record, as masks of shape (m,).
+    """Choose the parts of the records to leave out in turn.
 
-    With at least `pieces` records, each is left out as a whole; otherwise each is cut into equally many pieces in time.
+    Each part is a list with one mask of shape (m,) per record. With at least `pieces` records, each record is a part;
+    otherwise each is cut into equally many pieces in time.
     """
     cuts = -(-pieces // len(records))
     parts = []

@@ -139,7 +139,10 @@ class LawProblem:
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:
-        """Return starts, (starts, parameters), with bristles softer and stiffer than assumed."""
+        """Return starts of the fit, (starts, parameters), with softer and stiffer bristles.
+
+        All other numbers are the prior ones.
+        """
         settings = LawSettings.current()
         starts = np.tile(self.start, (len(settings.stiffness_factors), 1))
         starts[:, self.names.index("stiffness")] += np.log(settings.stiffness_factors)
@@ -150,7 +153,10 @@ class LawProblem:
         return list(zip(used, self.records, strict=True))
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
-        """Return weighted residuals of all records, (rows, samples), large for a failed run."""
+        """Return weighted residuals of all records side by side, shape (rows, samples).
+
+        `weights` has one array of shape (m,) per record. Residuals of a failed run are large but finite.
+        """
         settings = LawSettings.current()
         with np.errstate(invalid="ignore"):  # a failed run may be infinite where its weight is 0
             parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]

@@ -71,7 +71,7 @@ def read_log(
 
 
 def _undecided(proposal: Proposal) -> list[str]:
-    """Return a line for each role for which several channels are possible."""
+    """Return a line for each role for which several channels are possible, with an option."""
     return [
         f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"
@@ -170,7 +170,11 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
-    """List warnings about the signals for the engineer."""
+    """List warnings about the signals for the engineer.
+
+    Signals may be constant or clipped, and position may contradict velocity or lag behind the force. `base` has the
+    common instants.
+    """
     settings = LogSettings.current()
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():

@@ -144,10 +144,10 @@ def interpolated(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Return the ratio of measured velocity to the derivative of position, and their correlation.
+    """Return the ratio of measured velocity to the derivative of position, with correlation.
 
-    The ratio is by least squares. Velocity [m/s] and position [m] are sampled every `period` [s], and smoothed over 11
-    samples. Returns NaN and 0 if nothing can be compared.
+    The ratio is by least squares. Velocity [m/s] and position [m] are sampled every `period` [s], with gaps between
+    `parts`, and smoothed over 11 samples. Returns NaN and 0 if nothing can be compared.
     """
     from scipy.signal import savgol_filter
 
@@ -176,9 +176,10 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """Return the warning on a contradiction between position [m] and velocity [m/s], "" for none.
+    """Return a warning if velocity [m/s] and derivative of position [m] contradict each other.
 
-    Both are sampled every `period` [s]; a usual factor points to wrong units or counts.
+    Returns "" if they agree. Both are sampled every `period` [s], with gaps between `parts`. The warning names the
+    likely cause, such as counts for metres, if the ratio is a usual one.
     """
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:

@@ -57,9 +57,9 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
 
 
 def _answer(command: list[str], seconds: float, most: int) -> bytes | None:
-    """Return the first `most` bytes of a program's output; None if it exceeded its processor time.
+    """Return the first `most` + 1 bytes of a program's output.
 
-    Raises TimeoutError if it takes too long.
+    Returns None if it exceeded its processor time. Raises TimeoutError if it takes longer than `seconds`.
     """
     environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     pipe, late = subprocess.PIPE, []

@@ -65,7 +65,10 @@ def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
 
 
 def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
-    """Return the fraction of an effect that its causes explain, for each lag of the search."""
+    """Return the fraction of an effect that its causes explain, for each lag of the search.
+
+    The effect has the shape (n,); lags run from the longest negative to the longest positive one.
+    """
     longest = LogSettings.current().longest_delay_samples
     middle = effect[longest:-longest] - effect[longest:-longest].mean()
     energy = middle @ middle
@@ -94,7 +97,8 @@ def _peak(heights: np.ndarray) -> float:
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
     """Return the mean estimate over blocks of a record and half of its 95 % interval (Student).
 
-    NaN if fewer than half of the blocks have an estimate.
+    `estimate` takes the first and the last sample of a block, of a record of `size` samples. Both results are NaN for a
+    short record, or if fewer than half of the blocks have an estimate.
     """
     settings = LogSettings.current()
     from scipy.stats import t as student
@@ -127,7 +131,10 @@ def _line(late: str, early: str, estimate: tuple[float, float], period: float) -
 
 
 def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
-    """Return the smoothed derivative of an order, without its distorted ends."""
+    """Return the smoothed derivative of an `order`, without its distorted ends.
+
+    Values are sampled every `period` [s]; fewer than the filter needs are returned as they are.
+    """
     settings = LogSettings.current()
     from scipy.signal import savgol_filter
 

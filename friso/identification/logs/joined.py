@@ -18,7 +18,7 @@ def joinable(one: Log, other: Log) -> bool:
 
 
 def join_logs(logs: Sequence[Log]) -> Log:
-    """Join `joinable` logs, each a second after the end of the previous one."""
+    """Join `joinable` logs, each beginning a second after the end of the previous one."""
     first = logs[0]
     times, segments, start, end = [], [], 0, 0.0
     for log in logs:

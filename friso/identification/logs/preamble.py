@@ -71,7 +71,10 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 
 
 def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
-    """Return names and numbers from two rows above a table, as oscilloscopes write them."""
+    """Return names and numbers from two lines, a row of names above a row of numbers.
+
+    Oscilloscopes write such rows. Returns [] for fewer than two lines.
+    """
     if len(lines) < 2:
         return []
     names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
@@ -79,7 +82,7 @@ def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
 
 
 def _pair(line: str) -> tuple[str, str] | None:
-    """Return key and value of a line that has both."""
+    """Return key and value of a line such as "key: value"; None if it lacks either."""
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
@@ -115,7 +118,7 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
 
 
 def _horizontal(lines: Iterable[str]) -> str:
-    """Return the unit of the first column of a scope's table, if a line states it."""
+    """Return the unit of the first column of an oscilloscope's table; "" if no line states it."""
     pairs = [pair for line in lines if (pair := _pair(line))]
     return next((value.split(",")[0] for key, value in pairs if key.lower() in ("horizontal units", "x units")), "")
 

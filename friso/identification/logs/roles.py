@@ -272,7 +272,10 @@ def of_no_signal(name: str) -> bool:
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
-    """Return the only candidate whose name is exactly the role, or the word for it; else None."""
+    """Return the only candidate whose name is exactly the role, or the word for it; else None.
+
+    `matches` are the candidates with the words that imply the role; a single candidate gives None.
+    """
     if len(matches) < 2:
         return None
     for alone in (

@@ -61,7 +61,11 @@ class Reading:
         return self.mapping.axis_kind.unit(ROLES[role])
 
     def takes(self, role: str, si: str) -> bool:
-        """Tell whether a signal of a role may stay in the unit `si`."""
+        """Tell whether a signal of a role may stay in the unit `si`.
+
+        This is so for the role's own unit, for any unit unless reading is `strict`, and for foreign roles in volts or
+        amperes.
+        """
         return si == self.unit(role) or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
@@ -301,7 +305,10 @@ def _may_be_a_clock(channel: Channel) -> bool:
 
 
 def _offers(table: ChannelTable) -> str:
-    """Write which single numbers in the file could be the sample time; none is used unasked."""
+    """Write which single numbers in the file could be the sample time; "" if none could.
+
+    The user has to choose one; none is used unasked.
+    """
     offers = []
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower().replace("_", "")

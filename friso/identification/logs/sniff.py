@@ -199,9 +199,10 @@ if it does not fit."""
 def _fits(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]
 ) -> tuple[_Fit, _Fit]:
-    """Rate how well a delimiter and a decimal sign fit, without and with words in rows.
+    """Rate how well a delimiter and a decimal sign fit the lines of a text.
 
-    `rows` is the result of splitting by the delimiter.
+    `rows` are the lines split by this delimiter. The first result accepts no words in rows of numbers, the second does.
+    Each is a score with the layout, or None if no row fits.
     """
     numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
 
@@ -215,7 +216,11 @@ def _fits(
 def _fit(
     lines: Sequence[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
 ) -> _Fit:
-    """Rate a delimiter and a decimal sign, given which rows are numbers."""
+    """Rate a delimiter and a decimal sign, given which rows are numbers.
+
+    The result is a score with the layout: the number of such rows, whether all columns have names, the number of
+    columns. Returns None without any row of numbers.
+    """
     if not any(is_row):
         return None
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))

@@ -62,7 +62,7 @@ def read_text(path: Path) -> ChannelTable:
 
 
 def _such_as(cells: Any) -> str:
-    """Return an example of a column's texts that look like numbers, for a message."""
+    """Return an example of a column's texts, for a message; "" if it contains no digit."""
     texts = cells.dropna().astype(str).str.strip()
     first = next(iter(texts[texts != ""]), "")
     return f", but texts such as {quoted(first[:40])}" if re.search(r"\d", first) else ""
@@ -146,7 +146,7 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
-    """Tell whether a comma occurs anywhere after the first numbers of a file."""
+    """Tell whether a comma occurs anywhere in a file, from the first row of numbers on."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
         for _ in range(form.first):
@@ -236,7 +236,8 @@ def _time_of_day(texts: Any) -> np.ndarray:
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
     """Return the columns without the empty cells below their last value.
 
-    A single cell that is missing at the end of a row becomes NaN, which the checks report.
+    Raises LogError if one of the last two rows of the file ends before a column that the others have. Columns with
+    times of their own may have different lengths.
     """
     out = []
     for column in columns:

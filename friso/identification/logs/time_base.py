@@ -74,9 +74,10 @@ def usual_step(steps: np.ndarray) -> float:
 
 
 def gaps(steps: np.ndarray) -> np.ndarray:
-    """Tell which time steps, shape (n,), are gaps.
+    """Tell which time steps, shape (n,), are gaps: longer than a few usual steps.
 
-    After a gap, samples stay late; a step that is long by scatter only has short neighbours.
+    After a gap the samples stay late. A step that is long only because a stamp is late has short neighbours, and is no
+    gap.
     """
     settings = LogSettings.current()
     usual = float(np.median(steps))
@@ -264,6 +265,9 @@ def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
-    """Return the stretches of a segment in which all samples are covered."""
+    """Return the stretches of the segment `part` in which all samples are covered.
+
+    `covered`, shape (n,), marks the samples that all tracks have.
+    """
     edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
     return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

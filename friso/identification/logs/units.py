@@ -87,9 +87,9 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """Return the unit text after a division sign, in brackets if it is a product.
+    """Return the unit text after an operator, in brackets if it is a product below a stroke.
 
-    Without brackets "rad/N*m" would read as rad/N times m.
+    `before` is the operator. Without brackets "rad/N*m" would read as rad/N times m.
     """
     return f"({part})" if before == "/" and "*" in part else part
 

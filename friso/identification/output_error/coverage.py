@@ -37,7 +37,11 @@ class Coverage:
 
     @property
     def gap(self) -> tuple[float, float]:
-        """Return the widest range of speeds [m/s] without steady motion."""
+        """Return the range of speeds [m/s], widest by ratio, without steady motion.
+
+        It lies between neighbouring steady speeds, or below the lowest. Without steady motion it has no upper end
+        (infinite).
+        """
         speeds = np.concatenate([[self.slowest], self.steady]) if self.steady.size else np.array([self.slowest, np.inf])
         widest = int(np.argmax(speeds[1:] / speeds[:-1]))
         return float(speeds[widest]), float(speeds[widest + 1])

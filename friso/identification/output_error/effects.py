@@ -30,10 +30,10 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the size of the last force differs from 0 by more than its correlated errors.
+        """Tell whether the last force is present: its size differs from 0 by more than its error.
 
-        Errors repeat at every reversal: for a slow sine, a coupling or a delay then looks like slightly different
-        friction.
+        The error allows for correlation: it repeats at every reversal. For a slow sine, a coupling or a delay then
+        looks like slightly different friction.
         """
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)

@@ -72,7 +72,8 @@ class OutputErrorFit:
     def is_noise_of_motion(self, noise: float) -> bool:
         """Tell whether noise of the logged motion explains the whole residual.
 
-        Such noise accumulates and resembles slow effects. `noise` [N] is the force noise of the log.
+        Such noise accumulates and resembles slow effects. `noise` [N] is the force noise of the log. False if noise of
+        the motion is small beside it.
         """
         return self.problem.shaking[0] > 0 and self.left <= self.problem.noise_left(noise)
 
@@ -296,7 +297,11 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return the shift of the fitted numbers by other inputs that the log allows, shape (free,)."""
+    """Return the shift of the fitted numbers by other inputs that the log allows, shape (free,).
+
+    `best` are the numbers, `rest` [N] their residual, (n,), and `slopes` its derivatives, (n, free). The shift is 0 if
+    the simulation with the other `inputs` fails.
+    """
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():

@@ -154,7 +154,7 @@ def believed(
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
-    """Tell whether a fit with more parameters is better by more than chance would make it."""
+    """Tell whether a fit with more parameters, `full`, is better than `plain` beyond chance."""
     settings = OutputErrorSettings.current()
     more = len(full.free) - len(plain.free)
     return bool(
@@ -191,7 +191,10 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve unless its height and its velocity are both determined."""
+    """Drop the Stribeck curve unless its height and its velocity are both determined.
+
+    Only those of the two that are `optional` must be; `identifiable` are the names of determined parameters.
+    """
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
 

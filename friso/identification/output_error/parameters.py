@@ -50,9 +50,9 @@ class FitParameter:
 
 
 def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the range of pre-sliding displacements in a fit [m], or [rad] on a rotary axis.
+    """Return the shortest and longest bend of bristles before sliding in a fit [m].
 
-    Angles follow from the smallest and largest bearing radii.
+    On a rotary axis they are angles [rad], which follow from the largest and smallest bearing radii.
     """
     settings = OutputErrorSettings.current()
     if axis_of(flat) == LINEAR:

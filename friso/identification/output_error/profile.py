@@ -62,7 +62,10 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
-    """Fit the other parameters at each value of one, unless the cost stays above `limit`."""
+    """Fit the other parameters at each of the `values` of one, the parameter `number`.
+
+    A fit whose mean square would stay above `limit` is abandoned.
+    """
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
@@ -91,7 +94,7 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.ndarray:
     """Return how far the other numbers shift per shift of one, to first order, shape (others,).
 
-    The shifts are 0 if the number is not fitted.
+    The one has the index `number`. The shifts are 0 if it is not fitted.
     """
     if number not in fit.free:
         return np.zeros(len(others))
@@ -104,7 +107,11 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
-    """Find where a profile crosses the limit on either side of its minimum, if it does."""
+    """Find where a profile crosses the limit on either side of its minimum.
+
+    `cost` belongs to each of the `values`. Returns the lower and upper end, and for each whether the profile does not
+    cross there; the end is then that of the values.
+    """
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]
     inside = cost <= max(limit, cost[lowest])
@@ -117,7 +124,7 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 
 
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
-    """Find where a profile crosses the limit between two values.
+    """Find where a profile crosses the limit between two values, by their indices.
 
     Between them, the square root of the excess cost is taken to grow linearly with distance from the best fit.
     """

@@ -110,7 +110,11 @@ def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -
 
 
 def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> np.ndarray:
-    """Return damped Gauss-Newton steps, shape (rows, dampings, parameters)."""
+    """Return damped Gauss-Newton steps, shape (rows, dampings, parameters).
+
+    `squares` (rows, parameters, parameters) is J' J, and `downhill` (rows, parameters) is -J' r. `dampings` has the
+    shape (rows, dampings).
+    """
     curvature = np.diagonal(squares, axis1=1, axis2=2)
     diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(downhill.shape[1])
     damped = squares[:, None] + dampings[:, :, None, None] * diagonal[:, None]

@@ -55,7 +55,7 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     """Widen the damping of the bristles by the effect of one sample of delay.
 
     A delay looks like bristle damping of delay times bristle stiffness. The widening is for a stage that followed a log
-    without explaining it to its noise.
+    without explaining it to its noise. A fit without both bristle parameters stays as it is.
     """
     if not {*BRISTLES} <= {*fit.fitted}:
         return fit

@@ -68,9 +68,9 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Widen standard deviations until their intervals reach the upper end of logarithmic ones.
 
-    An interval symmetric in the logarithm is not symmetric in the value. If it reaches 0.5 each way, its ends lie 65 %
-    above the value and 39 % below. For the upper end, relative deviations above 1 count as 1. No deviation becomes
-    smaller.
+    An interval symmetric in the logarithm of a value is not symmetric in the value. If it reaches 0.5 each way, its
+    ends lie 65 % above the value and 39 % below. For the upper end, deviations relative to `values` above 1 count as 1.
+    No deviation becomes smaller.
     """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
@@ -130,7 +130,7 @@ def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
-    """Return the stage-file keys, and their derivatives to fitted numbers, (keys, parameters)."""
+    """Return the stage-file keys, and their derivatives by fitted numbers, (keys, parameters)."""
     at = _keys_at(fit, fit.inner)
     step = 1e-6
     moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]
@@ -140,7 +140,8 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     """Return the range [SI] that any bearing may have of a parameter that is not determined.
 
-    `owner` is the parameter's name. The fitted value is no bound, because it compensates for what the model lacks.
+    `owner` is the parameter's name. For the ratio of static to Coulomb friction the range is one of static friction.
+    The fitted value is no bound, because it compensates for what the model lacks.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]
