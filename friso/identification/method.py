@@ -131,7 +131,10 @@ def with_laws(
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
-    """Tell whether no estimate has a value or, unless the analysis `failed`, a finite bound."""
+    """Tell whether estimates say nothing: none has a value or a finite bound.
+
+    If an analysis `failed`, bounds do not count. Without any estimate the result is false unless an analysis failed.
+    """
     ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
     none_determined = not any(estimate.determined for estimate in estimates)
     return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))

@@ -73,7 +73,7 @@ class Quality:
 
     @property
     def lacking(self) -> float:
-        """Return the fraction of the RMS residual that is not noise: 0 for a complete model."""
+        """Return the fraction of the RMS residual that is not noise, from 0 to 1."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
 
 
@@ -126,7 +126,11 @@ def quality_of(
 def _verdict(
     plain: Quality, reasons: list[RaisedDoubt], unit: str, poor: bool, rejected: bool, frictionless: bool
 ) -> str:
-    """Write how much the fit leaves unexplained, and why; "" for a complete model."""
+    """Write how much the fit leaves unexplained, and why; "" for a complete model.
+
+    `reasons` are findings that explain it. The inverse model may be `poor`, or the whole model `rejected`;
+    `frictionless` is true if the stage file says that there is no friction.
+    """
     why = "".join(f"; {cause.words}" for cause in reasons)
     if poor:
         return (

@@ -75,7 +75,7 @@ class Recorded(Motion):
 
     @staticmethod
     def motion_size(flat: Mapping[str, Any]) -> Any:
-        """Return the distance [m] between the highest and lowest position of the reference."""
+        """Return the distance [m] between the highest and the lowest position of the reference."""
         return np.abs(flat[SCALE]) * np.ptp(_samples(flat)[1])
 
     @staticmethod

@@ -46,7 +46,7 @@ def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarr
 
 
 def binned(values: np.ndarray, count: int) -> np.ndarray:
-    """Return the number of the bin, of equal width, of each value, shape (n,)."""
+    """Return for each value the number of its bin, of `count` bins of equal width; shape (n,)."""
     edges = np.linspace(values.min(), values.max(), count + 1)[1:-1]
     return np.digitize(values, edges)
 
@@ -113,7 +113,8 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Invert X' X for unit columns X, and tell which columns the others can replace.
 
-    Directions that the columns do not resolve are left out.
+    Directions that the columns do not resolve are left out. `square` is X' X, shape (p, p); the second result has the
+    shape (p,).
     """
     settings = IdentificationSettings.current()
     sizes, directions = np.linalg.eigh(square)

@@ -138,7 +138,10 @@ def estimate_text(estimate: Estimate) -> str:
 
 
 def round_uncertainty(half: float) -> tuple[str, int]:
-    """Round an uncertainty up, to two digits; return its text and its number of decimal places."""
+    """Round an uncertainty up, to two digits; return its text and its number of decimal places.
+
+    The number is negative if tens, hundreds and so on are the last digit.
+    """
     digits = IdentificationSettings.current().digits_of_an_uncertainty - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits
     return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

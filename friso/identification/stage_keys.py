@@ -91,7 +91,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
     """Restrict an estimate to the limits of its key, or return None if that is impossible.
 
-    The second result is the reason for a change, or "".
+    The second result is the reason for a change, or "". Estimates without finite ends give None, too.
     """
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]

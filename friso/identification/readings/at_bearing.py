@@ -88,8 +88,8 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
 def believed_between(prior: Prior, log: Log) -> Between:
     """Return the elements between force and bearing, from other experiments or the stage file.
 
-    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError for a [setup] that the
-    stage does not take.
+    The viscous friction of a stage file counts as uncertain by its whole size. Raises InputError if the log's [setup]
+    makes a change that the stage does not allow.
     """
     believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
@@ -165,7 +165,10 @@ def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
 
 
 def why_unseen(record: BearingRecord, fewest: int) -> str:
-    """Return why a record cannot be used, such as too few samples or no force; "" if it can."""
+    """Return why a record cannot be used, such as too few samples or no force; "" if it can.
+
+    `fewest` is the number of samples that it must have.
+    """
     settings = ReadingSettings.current()
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
@@ -188,7 +191,10 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 
 
 def cutoff_of(record: BearingRecord) -> float:
-    """Choose the low-pass [Hz]: the bandwidth of the motion, unless the record is too short."""
+    """Choose the low-pass [Hz] of a record: the bandwidth of its motion, within limits.
+
+    It is at most a fraction of the sampling frequency, and at least some periods fit into the record.
+    """
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
     return max(

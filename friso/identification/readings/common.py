@@ -63,23 +63,26 @@ def channel(log: Log, role: str) -> np.ndarray:
 
 
 def deflection(log: Log) -> np.ndarray | None:
-    """Return the stage's position minus the cart's [m], shape (n,).
+    """Return the stage's position minus the cart's [m], shape (n,); None if the log has neither.
 
-    The result is measured, or the difference of two sensors; None without either.
+    It is measured, or computed from a stage and a cart sensor.
     """
     return _apart(log, "relative_position", "cart_position")
 
 
 def cart(log: Log) -> np.ndarray | None:
-    """Return the position of the cart [m], shape (n,).
+    """Return the position of the cart [m], shape (n,); None if the log does not show it.
 
-    The result is measured, or the difference of two sensors; None without either.
+    It is measured, or the stage's position minus the measured deflection.
     """
     return _apart(log, "cart_position", "relative_position")
 
 
 def _apart(log: Log, role: str, other: str) -> np.ndarray | None:
-    """Return the signal of a role, or the position minus the `other` role's; None without either."""
+    """Return the signal of a role, or the position minus the signal of the role `other`.
+
+    Returns None if the log has neither the role nor both other signals.
+    """
     if role in log:
         return channel(log, role)
     return channel(log, "position") - channel(log, other) if {"position", other} <= log.signals.keys() else None
@@ -238,7 +241,7 @@ def block_mean(values: np.ndarray) -> Mean:
 
 
 def correlated_mean(values: np.ndarray) -> Mean:
-    """Return the mean of values in a row that may be correlated with their predecessors.
+    """Return the mean of values in a row, each of which may be correlated with the one before.
 
     The degrees of freedom follow from the equivalent number of independent values (first-order autoregression).
     """

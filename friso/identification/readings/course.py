@@ -49,7 +49,7 @@ class Course:
 
     @cached_property
     def repetition(self) -> Repetition | None:
-        """Return the repetition of the driving signal; None without one."""
+        """Return how the driving signal repeats; None if it does not."""
         part = self.log.longest
         try:
             periods = find_periods(self.log[self.signal][part])
@@ -130,7 +130,7 @@ class Course:
 
     @cached_property
     def against_a_spring(self) -> bool:
-        """Tell whether the position rests at several places, and the force rises with the place."""
+        """Tell whether the position rests at several places, with a force that rises with it."""
         settings = ReadingSettings.current()
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
@@ -146,13 +146,13 @@ class Course:
 
     @property
     def repeats(self) -> str:
-        """Return in words what repeats; "" for nothing."""
+        """Return in words which signal repeats, and after how many samples; "" if none does."""
         repetition = self.repetition
         return f"the {self.signal} repeats every {repetition.samples} samples" if repetition else ""
 
     @property
     def words(self) -> str:
-        """Describe in words what repeats in the log, and how."""
+        """Describe in words what repeats in the log, with its harmonics and reversals."""
         repetition = self.repetition
         if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"

@@ -109,9 +109,9 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
 def _map(
     stretch: Pass, places: np.ndarray, position: np.ndarray, force: np.ndarray, sample_time: float, mass: float
 ) -> PassMap:
-    """Return the mean force by place in one pass.
+    """Return the force along the rail in one pass, without inertia, as a mean for each place.
 
-    A place may be passed several times where the motion goes back a little.
+    A place may be passed several times where the motion goes back a little; places without samples are interpolated.
     """
     x, f = position[stretch.span], force[stretch.span]
     smooth = low_pass(x, sample_time, ReadingSettings.current().low_pass_of_passes)
@@ -156,11 +156,11 @@ def _length(fields: np.ndarray) -> np.ndarray:
 
 
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
-    """Estimate the correlation length of the force along the rail.
+    """Estimate the correlation length [m] of the force along the rail.
 
     `flat` is the force without its trend, `step` [m] the distance of places. Over the correlation length the
-    autocorrelation falls to 1/e. The interval follows from the ratio of estimated to true length in simulated random
-    fields with exponential correlation, detrended likewise.
+    autocorrelation falls to 1/e. The interval comes from simulated random fields with exponential correlation,
+    detrended likewise: it allows for the ratio of estimated to true length.
     """
     settings = ReadingSettings.current()
     name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
@@ -182,7 +182,10 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
 
 
 def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, ...]:
-    """Return the strongest spectral lines of the force over the place on the rail."""
+    """Return the strongest spectral lines of the force over the place on the rail.
+
+    `flat` [N] is the force without its trend, at places `step` [m] apart, passed at `speed` [m/s].
+    """
     rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
     inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
     best = inner[np.argsort(power[inner])[::-1][: ReadingSettings.current().harmonics_of_a_pass]]
@@ -192,7 +195,8 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
 def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
     """Return the correlation of each pair of maps that share half of the shorter one's places.
 
-    Maps are detrended. For passes in opposite directions, friction against the motion is compared.
+    An entry has the indices of both maps and the correlation. Maps are detrended. For passes in opposite directions,
+    friction against the motion is compared.
     """
     pairs = []
     for (i, first), (j, second) in combinations(enumerate(maps), 2):
@@ -248,7 +252,11 @@ def _from_to(values: list[float]) -> str:
 
 
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
-    """Tell whether the force is the friction of the rail, and say in a sentence why or why not."""
+    """Tell whether the force is the friction of the rail, and say in a sentence why or why not.
+
+    It is not if a pass is unsteady, if passes over equal places differ, or if it varies faster than the loop's
+    `crossover` [Hz].
+    """
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:

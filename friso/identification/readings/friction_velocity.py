@@ -107,10 +107,11 @@ def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
 def _together(
     velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
 ) -> tuple[Estimate, Direction, bool]:
-    """Separate the constant force from friction; tell whether forces refute the exponent.
+    """Separate the constant force from friction, by stretches in both directions.
 
     The constant force follows from least squares of Coulomb, viscous and constant force on all stretches, or with the
-    Stribeck curve if one shows. Also returns the friction of both directions without the constant force.
+    Stribeck curve if one shows. Returns the constant force, the friction of both directions without it, and whether
+    forces refute the exponent. Both are undetermined with fewer than two stretches in a direction.
     """
     name, method = "bias", f"{METHOD}, forward and backward"
     sign = np.sign(velocities)
@@ -275,9 +276,11 @@ def _fitted(
 
 
 def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
-    """Make estimates for a direction from a Stribeck curve, with intervals for any open exponent.
+    """Make estimates for a direction from a Stribeck curve, with intervals for any exponent.
 
-    Static friction and Stribeck velocity are determined only if speeds reach below the Stribeck velocity.
+    Any exponent counts that the forces leave open. Static friction and Stribeck velocity are determined only if speeds
+    reach below the Stribeck velocity. No number is, except perhaps the exponent, if friction may still fall at the
+    highest speed.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:
@@ -300,7 +303,10 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
 
 
 def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) -> Estimate:
-    """Make an estimate from the range of a fit; it is not determined if there is a `reason`."""
+    """Make an estimate from the range of a fit; it is not determined if there is a `reason`.
+
+    `name` is that of the key in [friction].
+    """
     key = f"friction.{name}"
     if reason:
         return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)

@@ -52,8 +52,8 @@ def stiffness_of_loading(
 
 
 def _spring(products: np.ndarray) -> float:
-    """Fit the last signal by all others, and return the coefficient of the first.
+    """Fit the last of several signals by all others, and return the coefficient of the first.
 
-    `products` are the scalar products of all signals.
+    `products`, shape (signals, signals), are the scalar products of the signals.
     """
     return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])

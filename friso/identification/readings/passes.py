@@ -96,7 +96,10 @@ def _velocity(log: Log) -> np.ndarray:
 
 
 def _of_reference(log: Log, part: slice) -> list[slice]:
-    """Find where the reference has constant velocity, without the time in which the axis settles."""
+    """Find where the reference has constant velocity, without the time of settling.
+
+    `part` are the samples of a segment. Standstill does not count.
+    """
     settings = ReadingSettings.current()
     reference = channel(log, "reference")[part]
     velocity = np.gradient(low_pass(reference, log.sample_time, settings.low_pass_of_passes), log.sample_time)
@@ -132,9 +135,10 @@ def _of_motion(velocity: np.ndarray, sample_time: float) -> list[slice]:
 
 
 def _trimmed(mask: np.ndarray, sample_time: float, share: float) -> list[slice]:
-    """Return the stretches of a mask without their ends.
+    """Return the stretches of a mask without their ends, as far as they are long enough.
 
-    Both ends are cut by the filter's settling time, and the start by a further fraction for the axis to settle.
+    Both ends are cut by the filter's settling time, and the start by a further fraction, `share`, for the axis to
+    settle.
     """
     settings = ReadingSettings.current()
     edge, least = (
@@ -159,7 +163,7 @@ def _pass(log: Log, span: slice, velocity: np.ndarray) -> Pass:
 
 
 def _digit(position: np.ndarray) -> float:
-    """Return the resolution [m] of a position: the smallest step, if all are multiples of it.
+    """Return the resolution [m] of a position: the smallest step, if all steps are multiples.
 
     Otherwise, and for a position that never changes, the result is 0.
     """

@@ -106,6 +106,6 @@ def _lowest(push: np.ndarray) -> float:
 
 
 def _half(push: np.ndarray) -> int:
-    """Return the last sample at which a smoothed push, shape (n,), is below half of its rise."""
+    """Return the last sample at which a smoothed push, (n,), is below the middle of its ends."""
     smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

@@ -24,7 +24,11 @@ _SPEEDS = np.geomspace(1e-4, 10, 2001)
 def break_away(
     force_rate: float, static: float, coulomb: float, bristle_stiffness: float, stribeck_velocity: float
 ) -> float:
-    """Return the least break-away force [N] of LuGre friction at a `force_rate` [N/s]."""
+    """Return the least break-away force [N] of LuGre friction at a `force_rate` [N/s].
+
+    Static and Coulomb friction are in N, bristle stiffness in N/m, Stribeck velocity in m/s. Inertia, which is left
+    out, only raises break-away.
+    """
     level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
@@ -33,8 +37,8 @@ def break_away(
 def share_below(force_rate: float) -> float:
     """Return by which fraction break-away may lie below static friction at a rate [N/s].
 
-    The bound holds for any Coulomb friction, if bristle stiffness times Stribeck velocity is at least the setting
-    `least_bristle_rate`. Returns 1 for rates at which nothing can be concluded.
+    The bound holds whatever the Coulomb friction is, if bristle stiffness times Stribeck velocity is at least the
+    setting `least_bristle_rate`. Returns 1 for rates at which nothing can be concluded.
     """
     return min(1 - break_away(force_rate, 1.0, 0.0, ReadingSettings.current().least_bristle_rate, 1.0), 1.0)
 
@@ -63,9 +67,10 @@ def static_friction(
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: float) -> Estimate:
-    """Estimate static friction from break-aways at one rate, which are too low by a bounded part.
+    """Estimate static friction from break-aways at one rate.
 
-    The value is raised by half of the bound.
+    Break-aways are too low by a bounded part, and the value is raised by half of it. Static friction is not determined
+    if the bound is too large.
     """
     settings = ReadingSettings.current()
     mean = correlated_mean(forces)
@@ -89,7 +94,7 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, relative_error: f
 
 
 def _slow_enough() -> float:
-    """Return the highest force rate [N/s] at which ramps of one rate still show static friction."""
+    """Return the highest force rate [N/s] at which ramps of a single rate show static friction."""
     settings = ReadingSettings.current()
     rates = settings.least_bristle_rate * np.geomspace(1e-6, 1, 145)
     return float(max(rate for rate in rates if share_below(rate) <= 2 * settings.share_extrapolated))

@@ -31,7 +31,10 @@ class Slips:
 
 
 def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
-    """Find the slips in a position [m], shape (n,), differentiated below `cutoff` [Hz]."""
+    """Find the slips in a position [m], shape (n,), differentiated below `cutoff` [Hz].
+
+    A slip counts only after a rest of some length.
+    """
     settings = ReadingSettings.current()
     speed = rate(position, sample_time, cutoff)
     size = np.abs(speed)

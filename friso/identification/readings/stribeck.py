@@ -20,7 +20,10 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Possible:
-    """A parameter's best value, the range that the forces allow, and whether it is closed."""
+    """A parameter's best value, the range that the forces allow, and whether that is closed.
+
+    A range is `closed` unless it reaches an end of the search.
+    """
 
     value: float
     low: float
@@ -232,7 +235,10 @@ class _Grid:
 
 
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
-    """Return the range of grid points that lie inside, widened by half a step on each side."""
+    """Return the range of grid points that lie inside, widened by half a step on each side.
+
+    `points` ascend evenly, with `ratios` by ratio; the mask `inside` has their shape.
+    """
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points
     step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0

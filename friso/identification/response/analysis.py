@@ -135,7 +135,10 @@ def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[floa
 
 
 def _attempt(warnings: list[str], label: str, function, *arguments):
-    """Return the result of an analysis, or None after adding the reason to the warnings."""
+    """Return the result of a `function` with these arguments; None if it raises InputError.
+
+    The reason is then added to the warnings, after the `label` of what was sought.
+    """
     try:
         return function(*arguments)
     except InputError as error:
@@ -166,8 +169,8 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
     """Keep the spectral lines on which the response of any output stands out of the noise.
 
-    Returns the response of the driven mass, and of the other if measured. Raises InputError for an output that stands
-    out on no line.
+    The responses are those of the driven mass and, if measured, of the other; the results, too. Raises InputError for
+    an output that stands out on no line.
     """
     good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
     usable = [response.at(np.isin(response.frequency, good)) for response in responses]
@@ -183,7 +186,10 @@ def _below(model: TwoMass, band: FrequencyRange) -> bool:
 
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRange:
-    """Return the band [Hz] above the frequencies at which friction distorts the response."""
+    """Return the band [Hz] above the frequencies at which friction distorts the response.
+
+    If none were found, the band begins with the first line.
+    """
     low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
     return max(float(driven.frequency[0]), low), _top(driven)
 
@@ -213,7 +219,7 @@ def _single(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to one realisation."""
+    """Fit the two-mass model to one realisation, number `which`."""
     responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
     return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
 
@@ -262,7 +268,10 @@ def _left_out(
     band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Return, for each log, the relative errors with which the model of another log predicts it."""
+    """Return, for each log, the relative errors with which the model of another log predicts it.
+
+    The result is empty for a single log. A log is left out if no model fits the other one; `warnings` get the reason.
+    """
     if len(logs) < 2:
         return ()
     rows = []

@@ -48,7 +48,8 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
     """Return lower and upper limits of the parameters: delay, hold, and compliances.
 
-    Each has the shape (COMPLIANCES + outputs,). The model covers frequencies up to `top` [Hz].
+    Each has the shape (COMPLIANCES + outputs,); compliances have no limits. The model covers frequencies up to `top`
+    [Hz].
     """
     late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)

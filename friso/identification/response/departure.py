@@ -72,9 +72,10 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Tell whether distortion exceeds the noise on a part of the lines, and their ratio.
+    """Tell whether distortion exceeds the noise on a `part` of the lines, and by which ratio.
 
-    The ratio is that of noise with distortion to noise alone. The first result is None if the distortion is not known.
+    The ratio is that of noise with distortion to noise alone. The first result is None, and the ratio NaN, if the
+    distortion is not known.
     """
     settings = ResponseSettings.current()
     noise, distortion = response.noise[part], response.distortion[part]
@@ -148,7 +149,8 @@ def friction_from_departure(
 def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
     """Return the Coulomb friction that damps as much as an equivalent damper.
 
-    The interval spans the describing functions of random and of sinusoidal motion.
+    `velocity` is the standard deviation of the record's velocity, `unit` that of the friction. The interval spans the
+    describing functions of random and of sinusoidal motion. The friction is not determined without any damping.
     """
     method = "damping at low frequency, as Coulomb friction under random motion"
     if damping.high <= 0:

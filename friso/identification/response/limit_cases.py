@@ -49,7 +49,10 @@ def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
 
 
 def _sign(response: FrequencyResponse) -> float | None:
-    """Return the sign of the widest straight line of a response, whatever its slope."""
+    """Return the sign of the widest straight line of a response; None if it has no such line.
+
+    Stiffness, damping and mass lines count. The sign is -1 if the output opposes the input.
+    """
     lines = [line for slope in KINDS for line in straight_lines(response, slope, None, 1)]
     return max(lines, key=lambda line: line.octaves).sign if lines else None
 
@@ -67,10 +70,10 @@ def _resonances(modes: Modes | None) -> Mapping[str, float]:
 
 
 def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
-    """Tell by the lowest line whether the cart sticks or slides.
+    """Tell by the lowest straight line whether the cart is "stuck" or "sliding".
 
     A stiffness line means a stuck cart, a mass or damping line a sliding cart. A line above the first antiresonance, or
-    the first resonance if there is none, says nothing about the cart.
+    the first resonance if there is none, says nothing about the cart. Without another line the result is "".
     """
     kind = "antiresonance" if any(name.startswith("antiresonance") for name in pairs) else "resonance"
     first = min((value for name, value in pairs.items() if name.startswith(kind)), default=np.inf)

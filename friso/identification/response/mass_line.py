@@ -50,7 +50,8 @@ class StraightLine:
 def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
     """Find the mass lines of a force-to-position response, at most `most`, by frequency.
 
-    Below an antiresonance the whole mass makes the line, above the resonance the driven part. Returns () without any.
+    On a mass line the response falls as that of a free mass. Below an antiresonance it shows the whole mass, above the
+    resonance the driven part. Returns () without any.
     """
     return straight_lines(response, 2, most=most)
 
@@ -58,10 +59,10 @@ def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine
 def straight_lines(
     response: FrequencyResponse, slope: int, sign: float | None = None, most: int = 3
 ) -> tuple[StraightLine, ...]:
-    """Find bands in which a response falls with a `slope` of 0, 1 or 2.
+    """Find bands in which a response falls with frequency to the power `slope`: 0, 1 or 2.
 
-    The widest bands in octaves are searched first; the result is sorted by frequency. `sign` is 1 or -1 if the
-    direction of the input is known (default: that of most of the band).
+    The widest bands in octaves are searched first, at most `most`; the result is sorted by frequency. `sign` is 1 or -1
+    if the direction of the input is known (default: that of most of the band).
     """
     ordered = response.at((response.frequency > 0) & (np.abs(response.response) > 0))
     bands: list[tuple[int, int, float]] = []
@@ -90,7 +91,10 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
 def _parted(
     response: FrequencyResponse, slope: int, first: tuple[int, int, float], second: tuple[int, int, float]
 ) -> bool:
-    """Tell whether there is a mode between two bands, each given by its first and last line."""
+    """Tell whether there is a mode between two bands, each given by its first and last line.
+
+    The bands have one slope. A mode takes a line between them far off the level of both.
+    """
     lower, upper = sorted([first, second])
     level = _flat(response, slope, 1.0)[1]
     between = level[lower[1] + 1 : upper[0]]
@@ -102,7 +106,10 @@ def _parted(
 def _widest(
     response: FrequencyResponse, slope: int, sign: float | None, start: int, stop: int
 ) -> tuple[int, int, float] | None:
-    """Return the first and last line of the widest straight band, with its sign; None if none."""
+    """Return the first and last line of the widest straight band, with its sign; None if none.
+
+    Lines from `start` to before `stop` are searched. Without a `sign`, both are tried.
+    """
     signs = (1.0, -1.0) if sign is None else (sign,)
     bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
     return (
@@ -113,7 +120,8 @@ def _widest(
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
     """Return the widest band with acceptable chi-square and phase, as its first and last line.
 
-    All pairs of ends from line `start` to line `stop` are tried. Returns None if no band is wide enough.
+    Its ends are among evenly spaced lines from `start` to before `stop`, at most `edges_tried` of them. Returns None if
+    no band is wide enough.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:
@@ -217,7 +225,10 @@ def _independent(residual: np.ndarray) -> float:
 
 
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
-    """Return the shapes, (lines,), in which a straight line may bend towards the nearer mode."""
+    """Return the shapes, (lines,), in which a straight line may bend towards the nearer mode.
+
+    With modes equally near on both sides, or none at all, there are two: upwards and downwards in frequency.
+    """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])
     gone = frequency[np.abs(level - mean) > np.log(ResponseSettings.current().factor_between_lines)]

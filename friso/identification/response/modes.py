@@ -102,7 +102,10 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
 
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
-    """Return frequencies and damping ratios of resonances and antiresonances in the band."""
+    """Return frequencies and damping ratios of resonances and antiresonances in the band.
+
+    Damping ratios of 0.7 or more count as neither.
+    """
     estimates: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
@@ -131,9 +134,10 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
 
 
 def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
-    """Return the acceleration per input, below or above all modes.
+    """Return the acceleration per input on the mass line below or above all modes.
 
-    Below all modes the rigid body alone counts; above, the residues of the modes are added.
+    `which` is "low" or "high". Below all modes the rigid body alone counts; above, the residues of the modes are added.
+    The level is not determined without a rigid body, or above if modes beyond the band still act.
     """
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"

@@ -75,7 +75,7 @@ def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
     """Return starts of a fit, with different corner frequencies of friction and spring.
 
-    All starts have the magnitude of the first response.
+    The magnitude of each start is, on average, that of the first response in `values`.
     """
     settings = ResponseSettings.current()
     places = 2 * np.pi * np.array([0.0, *np.geomspace(frequency[0] / 3, frequency[-1], 6)])

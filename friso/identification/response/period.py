@@ -66,7 +66,11 @@ def repetition(signal: np.ndarray) -> np.ndarray:
 
 
 def _switched_off(signal: np.ndarray) -> int:
-    """Return the number of samples before the input is switched off, if it is off for over 10."""
+    """Return the number of samples before an input is switched off.
+
+    An input that is off at the end for 10 samples or fewer, or 0.5 % of the record, is not switched off: all samples
+    count.
+    """
     settings = ResponseSettings.current()
     moving = np.flatnonzero(np.abs(signal - signal[-1]) > settings.amplitude_switched_off * np.ptp(signal))
     stop = int(moving[-1]) + 1 if moving.size else 0
@@ -76,7 +80,7 @@ def _switched_off(signal: np.ndarray) -> int:
 def _shortest(change: np.ndarray) -> int:
     """Return the shortest lag at which a signal repeats as well as at any other.
 
-    Lags before the signal has changed do not count.
+    Lags before the signal has changed do not count. Raises InputError if it repeats at no lag.
     """
     away = np.flatnonzero(change > 0.5)
     first = int(away[0]) if away.size else len(change)
@@ -104,14 +108,17 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
-    """Return the local minimum of the change that is reached downhill from a lag."""
+    """Return the lag of the minimum of `change` that is reached downhill from `lag`, rising."""
     while lag + 1 < len(change) and change[lag + 1] < change[lag]:
         lag += 1
     return lag
 
 
 def _near(change: np.ndarray, expected: float) -> int:
-    """Return the lag near an expected one at which the signal repeats best."""
+    """Return the lag within 2 % of an expected one at which the signal repeats best.
+
+    Raises InputError if it does not repeat there, or if the expected lag is beyond half the record.
+    """
     low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
     if not 2 <= expected < len(change):
         raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")

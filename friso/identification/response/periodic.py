@@ -118,7 +118,10 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deviation of the mean response over realisations, and its degrees of freedom."""
+    """Return the deviation of the mean response over realisations, and its degrees of freedom.
+
+    Both have the shape (lines,). With few realisations, neighbouring lines share their variance.
+    """
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
     count = len(records)

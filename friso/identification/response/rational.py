@@ -51,7 +51,11 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Fit models with 0, 1, ... modes, as long as one more mode helps."""
+    """Fit models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
+
+    The last result is the best of these models with a constant added. `s` are complex frequencies over a scale,
+    (lines,).
+    """
     rows: list[Row] = []
     nonlinear = np.zeros(2)
     for modes in range(most + 1):
@@ -70,7 +74,10 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
 
 
 def simplest_model(rows: list[Row]) -> Row:
-    """Return the simplest model that no larger model beats clearly."""
+    """Return the model that wins if models are compared in order of their size.
+
+    A larger model must beat the winner so far clearly.
+    """
     ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
     best = ordered[0]
     for row in ordered[1:]:
@@ -80,7 +87,10 @@ def simplest_model(rows: list[Row]) -> Row:
 
 
 def _better(larger: Row, smaller: Row) -> bool:
-    """Tell whether a larger model beats a smaller one clearly."""
+    """Tell whether a larger model beats a smaller one clearly.
+
+    Its Bayesian criterion and its sum of squares must both be lower by more than the settings ask.
+    """
     settings = ResponseSettings.current()
     return (
         larger.bic < smaller.bic - settings.criterion_of_a_mode

@@ -138,7 +138,11 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
-    """Write sentences on periods left out: those with another input, and transient ones."""
+    """Write sentences on periods left out: those with another input, and transient ones.
+
+    `alike` marks the periods with equal input, of which the `first` are transient. Nothing is yielded if none is left
+    out.
+    """
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
     if first:
@@ -198,7 +202,11 @@ def _same_excitation(driving: np.ndarray) -> np.ndarray:
 
 
 def _excited(driving: np.ndarray) -> np.ndarray:
-    """Tell which lines the external signal excites intentionally, shape (lines,)."""
+    """Tell which lines the external signal excites intentionally, shape (lines,).
+
+    `driving` is its spectrum, shape (periods, lines). These lines stand out of its noise, and of other lines that are
+    much weaker.
+    """
     settings = ResponseSettings.current()
     mean = np.abs(driving.mean(axis=0))
     noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean

@@ -79,7 +79,10 @@ class FrequencyResponse:
         return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
 
     def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
-        """Return the response of another output, by an exact complex `factor` per line, (lines,)."""
+        """Return the response of another output, by an exact complex `factor` per line, (lines,).
+
+        `output` is the name of the output, in the unit `output_unit`.
+        """
         size = np.abs(factor)
         return replace(
             self,

@@ -49,7 +49,7 @@ class TwoMass:
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
         """Return the complex response of one mass, shape (n,), at frequencies [Hz], shape (n,).
 
-        It is the driven mass if `collocated`, otherwise the other mass.
+        It is the driven mass if `collocated`, otherwise the other mass, which must have been fitted.
         """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
@@ -114,7 +114,7 @@ def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 
     If single fits scatter more than their intervals allow, friction moves the parameters from realisation to
     realisation, which one response cannot show. Intervals are then scaled up by the Birge ratio (Birge 1932,
-    doi:10.1103/PhysRev.40.207). Raises InputError for fewer than two.
+    doi:10.1103/PhysRev.40.207). Raises InputError for fewer than two single fits.
     """
     if len(apart) < 2:
         raise InputError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
@@ -162,7 +162,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
 def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
     """Return a start of the fit from the first antiresonance and resonance of a rational fit.
 
-    The total mass is 1. Returns [] without both.
+    The total mass is 1. Returns [] without both, or if the antiresonance is not below the resonance.
     """
     try:
         modes = fit_modes(response)
