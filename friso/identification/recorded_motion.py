@@ -85,7 +85,7 @@ class Recorded(Motion):
 
 
 def _samples(flat: Mapping[str, Any]) -> RecordedSamples:
-    """Return the samples of a record.
+    """Return the samples of a recorded reference.
 
     Raises InputError for a file without samples, or with gaps.
     """

@@ -103,8 +103,8 @@ def origins(
 ) -> dict[str, str]:
     """Return the origin of each key of an identified stage, in words.
 
-    The origin is an estimate, another key that it follows, the stage file, or friso's choice of the `chosen` keys
-    (None: all).
+    A key was identified, follows another one (`follows`), was given in the stage file, or was chosen by friso. The last
+    applies to the `chosen` keys (None: all that were not identified).
     """
     sources: dict[str, str] = {}
     for estimate in estimates:

@@ -39,7 +39,7 @@ def drive_stiffness(mechanism: Mechanism) -> Any:
 
 
 def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
-    """Return the stiffness along the motion under the load along the leaves.
+    """Return the stiffness along the motion [N/m] under the load along the leaves.
 
     The stiffness vanishes at the buckling load.
     """
@@ -62,9 +62,10 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
 
 
 def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Return the stiffness along the leaves while all other coordinates are held.
+    """Return the stiffness along the leaves [N/m] while all other coordinates are held.
 
-    The stiffness falls as the leaves deflect, because deflected leaves bend under the force. Leaves count as plates.
+    The stiffness falls as the leaves deflect, because leaves under a `deflection` [m] bend under the force. Leaves
+    count as plates.
     """
     straight = mechanism.leaves * axial(mechanism) / mechanism.length
     stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
@@ -72,10 +73,11 @@ def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
 
 
 def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
-    """Return the stiffness along the width while all other coordinates are held.
+    """Return the stiffness along the width [N/m] while all other coordinates are held.
 
-    The stiffness contains bending and shear in the plane of the leaves. A force across a deflected leaf also twists it
-    by 4 delta (s/L)^3, with s from its middle, without the warping that its clamps forbid.
+    The stiffness contains bending and shear in the plane of the leaves. A force across a leaf under a `deflection` [m],
+    delta, also twists it by 4 delta (s/L)^3, with s from its middle. This is without the warping that its clamps
+    forbid.
     """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism

@@ -55,7 +55,7 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
 def measured_recording(flat: Any, recorded: RecordedRuns) -> Measures:
     """Measure recorded runs of stages, given as flat keys: swing, settling, outcome and more.
 
-    The force is the drive's command.
+    Where a measure needs the force, it is the one that the drive commanded.
     """
     attempted, rejected = (
         recorded.statistics[:, STATISTICS.index(name)].astype(np.int64) for name in ("attempted", "rejected")

@@ -37,9 +37,10 @@ class RecordedRuns:
 
     `numbers` are the numbers of the runs. `logged` are the signals that the drive knows, `true` the real motion, by the
     names of the roles of a log: SI, shape (runs, n), NaN after a failure. `statuses` tell of failures, shape (runs,);
-    `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for. If the delay is no
-    whole number of samples, `true` and the relative position are taken at the instant of the force, that fraction of a
-    sample later.
+    `statistics` are those of the solver; `outputs` are all signals of the equations, if asked for.
+
+    If the delay is no whole number of samples, `true` is taken at the instant of the force, that fraction of a sample
+    later. The logged "relative_position" of stage and cart is taken then, too.
     """
 
     numbers: np.ndarray

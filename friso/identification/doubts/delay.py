@@ -32,9 +32,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the force that a small delay adds, if the stage follows the log.
+    """Yield the force that a small delay adds: in proportion to the logged force's derivative.
 
-    It goes with the derivative of the log's force.
+    Nothing is yielded for a closed loop: only a stage that follows the log is examined.
     """
     force = delay_force(case)
     if not case.fit.problem.closed and force.any():

@@ -10,7 +10,10 @@ from friso.stage import Stage, plausible
 
 
 def find(case: tuple[Stage, Sequence[Estimate]]) -> Iterator[RaisedDoubt]:
-    """List identified keys of a stage whose values are implausible."""
+    """List identified keys of a stage whose values are implausible.
+
+    `case` has the stage and the estimates.
+    """
     stage, estimates = case
     keys = [estimate.name for estimate in estimates if estimate.determined]
     for sentence in plausible.implausible_values(stage):

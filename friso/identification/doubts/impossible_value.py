@@ -18,10 +18,10 @@ NEGATIVE = "it comes out negative, which it cannot be"
 
 
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
-    """Cut intervals at 0 for keys that cannot be negative, and refuse impossible values.
+    """Cut intervals at 0 for keys that cannot be negative, and withhold impossible values.
 
-    An estimate with a negative interval is refused. A key that must be positive gets an upper bound only, if its
-    interval contains 0.
+    An estimate whose whole interval is negative is withheld. A key that must be positive gets an upper bound only, if
+    its interval contains 0.
     """
     bounds = {key: declared.bound for key, declared in numeric_keys(case.flat).items()}
     answers = {}

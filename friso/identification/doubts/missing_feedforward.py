@@ -82,7 +82,10 @@ def lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:
 
 
 def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
-    """Return the reference's acceleration [m/s^2] and direction, (n,) each; {} without one."""
+    """Return the reference's acceleration [m/s^2] and direction, (n,) each; {} if not logged.
+
+    The acceleration is filtered as for a motion of this `bandwidth` [Hz].
+    """
     settings = IdentificationSettings.current()
     if "reference" not in log:
         return {}

@@ -10,7 +10,10 @@ from friso.stage import Stage
 
 
 def find(case: tuple[LawComparison, Stage]) -> Iterator[RaisedDoubt]:
-    """Check whether the records support the stage's friction law."""
+    """Check whether the records support the stage's friction law.
+
+    `case` has the comparison of the laws, and the stage.
+    """
     laws, stage = case
     model, supported = stage.flat()["friction.model"], [law.law for law in laws.supported]
     if supported and model not in supported and model in (law.law for law in laws.predictions):

@@ -70,6 +70,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
     """Tell whether a measured mass [kg] is that of the stage alone, not of all moving masses.
 
     Above the mode of a free joint the stage moves alone. The nearer of the stage's assumed mass and the total decides.
+    False if the joint is locked, or if there is none.
     """
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:

@@ -56,9 +56,9 @@ def _claims(course: Course) -> str | None:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
-    """Analyse a log of moves, in the machine's own loop if the user gave stage and reference.
+    """Analyse a log of moves, using results of other experiments.
 
-    Results of other experiments are used.
+    The machine's own loop is simulated if the user gave the stage and the log has a reference.
     """
     (whole,) = logs
     assert isinstance(whole, Log)
@@ -77,7 +77,7 @@ def _in_newtons(log: Log) -> bool:
 
 
 def _around(log: Log) -> Stage | None:
-    """Make a stage with assumed values for a log whose force is in newtons."""
+    """Make a stage with assumed values for a log; None if its force is not in newtons."""
     part = log.excerpt(ExperimentSettings.current().samples_of_moves)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 

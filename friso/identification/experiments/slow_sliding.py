@@ -205,7 +205,10 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 def _equation(
     record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
-    """Set up the equation of friction of a record, with signals low-passed at `cutoff` [Hz]."""
+    """Set up the equation of friction of a record, with signals low-passed at `cutoff` [Hz].
+
+    `contact` has mass and bristles, and `sizes`, shape (5,), the scales of the fitted numbers.
+    """
     settings = ExperimentSettings.current()
     seen, low_pass = record.seen(settings.low_pass_of_sliding * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, contact.mass[0])

@@ -201,8 +201,8 @@ def _peak(
 def _unseen(speed: np.ndarray) -> float:
     """Count the samples for which motion may have been hidden in noise.
 
-    The speed, (n,), from its first visible sample to its maximum, grew by a power of two in the time of its first
-    doubling. An evenly accelerating body would be hidden for less.
+    `speed`, shape (n,), runs from the first visible sample to the maximum. Before, it is taken to have doubled in equal
+    times, as in its first visible doubling. An evenly accelerating body would be hidden for less.
     """
     settings = ReadingSettings.current()
     first, top = float(speed[0]), float(speed[-1])

@@ -130,7 +130,10 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """Return the fields of a MATLAB structure, or a list of structures if all hold references."""
+    """Return the fields of a MATLAB structure, or a list of structures.
+
+    `children` are the fields, converted. If all fields hold references, `item` is an array of structures.
+    """
     import h5py
 
     references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]

@@ -34,7 +34,11 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)  # recognising a format and reading the file ask for one content
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
-    """Read a binary log in a separate process; the result is cached until the file changes."""
+    """Read a binary log in a separate process; the result is cached until the file changes.
+
+    `size` [B] and the time of the last change, `changed`, identify its state. Raises LogError for a file that cannot be
+    read.
+    """
     settings = LogSettings.current()
     memory = settings.memory_of_reading + settings.memory_per_byte * size if LIMITS_MEMORY else 0
     seconds = settings.time_of_reading + size / settings.speed_of_reading

@@ -308,7 +308,10 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
-    """List errors for missing sample times of channels."""
+    """List the error for the first channel without sample times; [] if all have them.
+
+    The list is empty, too, if several channels compete to be the time, which is another error.
+    """
     if "time" in proposal.rivals:
         return []
     for choice in choices:

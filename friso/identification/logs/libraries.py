@@ -25,7 +25,10 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Write a line on channels that have fewer samples than the (truncated) file states."""
+    """Write a line for each channel with fewer samples than the (truncated) file states.
+
+    `stated` has the number for each channel, or None. Returns [] if no channel is shorter.
+    """
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)

@@ -59,9 +59,9 @@ def explained_by(
 ) -> ExplainedResidual | None:
     """Explain a residual, shape (n,), by changes of the fitted numbers and additional effects.
 
-    `slopes` are the derivatives by the numbers, (n, numbers); `effects` and the weights `counted` have the shape (n,).
-    A number without effect, or with infinite derivatives, does not move. Returns None if the effects explain no more
-    than the best of `searched` random ones.
+    `slopes` are the derivatives by the numbers, (n, numbers). Each of the `effects`, and the weights `counted` of the
+    samples, has the shape (n,). A number without effect, or with infinite derivatives, does not move. Returns None if
+    the effects explain no more than the best of `searched` random ones.
     """
     settings = OutputErrorSettings.current()
     every = np.column_stack([slopes, *effects])

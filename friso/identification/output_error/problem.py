@@ -180,7 +180,7 @@ class Problem:
         return at, np.where(np.abs(to) <= np.abs(fro), to, fro).T
 
     def _step(self, inner: np.ndarray, i: int) -> float:
-        """Return the step of a number for derivatives, away from the nearer end of its range."""
+        """Return the step of fitted number `i` for derivatives, away from its range's nearer end."""
         settings = OutputErrorSettings.current()
         parameter = self.parameters[i]
         size = settings.derivative_step * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))

@@ -259,9 +259,9 @@ def distinct(speeds: np.ndarray) -> int:
 
 
 def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:
-    """Bound Coulomb and viscous friction where friction still falls with the speed.
+    """Bound Coulomb friction above and viscous friction below, where friction still falls.
 
-    A Stribeck effect makes the intercept of a straight line through the forces too high and its slope too low.
+    By a Stribeck effect, a straight line through the forces then has too high an intercept and too low a slope.
     """
     high = Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high)
     low = Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low)

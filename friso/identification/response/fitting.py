@@ -158,7 +158,10 @@ def refined(
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:
-    """Return the covariance of the sum of scores (lines, p) that are correlated over some lines."""
+    """Return the covariance of the sum of scores (lines, p) that are correlated over some lines.
+
+    A score is a column of the fit times the residual.
+    """
     total = scores.T @ scores
     reach = int(4 * (len(scores) / 100) ** (2 / 9))
     for lag in range(1, min(reach, len(scores) - 1) + 1):

@@ -92,9 +92,9 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """Return lags [samples] at which a signal would repeat, but for a slip of its clock.
+    """Return lags [samples] after which a signal would repeat, but for a slip of its clock.
 
-    The change after two such lags is several times the change after one.
+    After two such lags it has changed several times as much as after one. `change` is by lag, and `lags` are searched.
     """
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
