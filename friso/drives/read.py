@@ -110,7 +110,8 @@ def _with_answers(
 ) -> Stage:
     """Build the stage from the tables of an axis, with the user's answers laid over them.
 
-    Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults.
+    Answers whose key has a dot are keys of the stage file. Friction model and motion get defaults. Raises InputError
+    for an answer that is no key of a table, and for values that make no stage.
     """
     source = (
         f"Controller: {one_line(path.name)}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "

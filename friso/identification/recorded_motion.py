@@ -103,7 +103,11 @@ def _samples(flat: Mapping[str, Any]) -> RecordedSamples:
 def _read(
     path: Path, changed: int, size: int, names: tuple[str | None, ...], sample_time: float | None, axis: str
 ) -> RecordedSamples:
-    """Read the samples of a record, cached until its file changes."""
+    """Read the samples of a recorded reference, cached until its file changes.
+
+    Times [s] and values begin at 0. `changed` and `size` identify the state of the file; `names` are those of the
+    reference, the time and the unit. Raises InputError for a file that cannot be used.
+    """
     try:
         times, values = _signals(path, names, sample_time, axis)
         _check(times, values)
@@ -115,7 +119,8 @@ def _read(
 def _signals(path: Path, names: tuple[str | None, ...], sample_time: float | None, axis: str) -> RecordedSamples:
     """Return sample times [s] and reference [m] as stored in a file.
 
-    Raises LogError for a file that cannot be read, or one without such channels.
+    `names` has the channel of the reference, that of the time, and the unit of the reference; None leaves the choice to
+    friso. Raises LogError for a file that cannot be read, or one without such channels.
     """
     from friso.identification.logs.format import FORMATS
     from friso.identification.logs.gaps import check_gaps

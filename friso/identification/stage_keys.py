@@ -132,8 +132,8 @@ def _static_above(
     """Change `estimates` so that static friction is no smaller than Coulomb friction.
 
     A range of static friction is cut from below. Otherwise static friction follows an estimate of Coulomb friction, or
-    else Coulomb friction follows static friction, in the stage's ratio. Returns which key follows which; `notes` get a
-    sentence.
+    else Coulomb friction follows static friction, in the stage's ratio. Returns which key follows which, {} if neither
+    does; `notes` get a sentence on each change.
     """
     flat = stage.flat()
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:

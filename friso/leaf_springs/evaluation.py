@@ -113,7 +113,10 @@ class Evaluation:
 
     @property
     def interfering(self) -> Mode | None:
-        """Return the lowest mode that interferes with control, other than the drive mode."""
+        """Return the lowest mode that interferes with control; None without one.
+
+        The drive mode, on which control works, does not count.
+        """
         return next((mode for mode in self.modes if self.interferes(mode)), None)
 
     def interferes(self, mode: Mode) -> bool:

@@ -40,7 +40,10 @@ def off_its_reference(largest: float, rms: float) -> str:
 
 
 def dwell_sentences(dwells: Sequence[Dwell]) -> list[str]:
-    """Say how a stage settles at each place where its reference stands, the slowest first."""
+    """Say how a stage settles at each place where its reference stands, the slowest first.
+
+    Returns [] for a reference that never stands.
+    """
     if not dwells:
         return []
     texts = [f"{_place(dwell)} {_settling(dwell)}" for dwell in dwells]

@@ -404,7 +404,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
 
 
 def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """Ask how far a turn moves the load, unless a transmission tells."""
+    """Ask how far a turn moves the load; () if a transmission or an answer tells."""
     if TRAVEL in answers or travel_of(flat) is not None:
         return ()
     return (

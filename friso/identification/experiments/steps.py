@@ -102,7 +102,8 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
     """Find stretches of a segment at a constant position that are long enough to average.
 
-    The reference decides what is constant; without a reference, the position does.
+    The reference decides what is constant; without a reference, the position does, low-passed at `cutoff` [Hz]. `part`
+    are the samples of the segment; a short one has no stretches.
     """
     least = int(np.ceil(4 / (cutoff * log.sample_time)))
     if part.stop - part.start < 2 * least:

@@ -147,7 +147,8 @@ def _pull(
 ) -> tuple[np.ndarray, float]:
     """Return the low-passed force on the cart [N], and the relative error of its scale.
 
-    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`.
+    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`. Raises
+    InputError for a stiffness that is not positive, and if the log has neither signal.
     """
     if stiffness is None:
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises if missing

@@ -104,7 +104,10 @@ def _own(group: Any, name: Any) -> Any:
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
-    """Convert an HDF5 group or data set into a tree of dict, list, array and str."""
+    """Convert an HDF5 group or data set into a tree of dict, list, array and str.
+
+    Raises ValueError for a link, for values in another file, and for values too large for the file.
+    """
     import h5py
 
     if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references may lead to any data set

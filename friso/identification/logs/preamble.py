@@ -102,7 +102,10 @@ def _seconds(number: float, unit: str) -> float | None:
 
 
 def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
-    """Return the units of columns from a line that lists them, with or without a leading word."""
+    """Return the units of columns from a line that lists them, with or without a leading word.
+
+    `names` are those of the columns. Returns {} if no line fits.
+    """
     for line in lines:
         key, value = _pair(line) or ("", "")
         listed = _OF_UNITS.fullmatch(key) is not None

@@ -202,10 +202,10 @@ def as_numbers(texts: Any) -> np.ndarray:
 
 
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
-    """Return the seconds since the first of some time stamps.
+    """Return the seconds since the first of some time stamps; NaN where none is `present`.
 
     In dates that are not ISO 8601, day or month may come first: only the time of day counts, and a time that steps back
-    belongs to the next day.
+    belongs to the next day. Raises LogError for impossible dates and times.
     """
     texts = texts.str.replace(",", ".", regex=False)
     try:

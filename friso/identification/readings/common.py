@@ -173,7 +173,7 @@ def _median(sizes: np.ndarray, digit: float) -> float:
 
 
 def digit_of(signal: np.ndarray) -> float:
-    """Return the resolution of a signal, shape (n,).
+    """Return the resolution of a signal, shape (n,); 0 if it has none.
 
     The resolution is the common step of the levels at which the signal stays (interpolation does not change it), else
     the smallest step. A signal that mostly stays at a few levels is a stepped command and has no resolution.

@@ -177,7 +177,7 @@ def _digit(position: np.ndarray) -> float:
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, digit: float) -> float:
-    """Return the standard deviation of fast oscillation of the velocity [m/s].
+    """Return the standard deviation of fast oscillation of the velocity [m/s]; 0 if none shows.
 
     The oscillation is faster than the low-pass of passes. Only spectral lines clear of the noise count. Motion by less
     than one `digit` [m] of the position does not count.

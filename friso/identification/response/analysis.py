@@ -106,7 +106,10 @@ def analyse(
 
 
 def _outputs(logs: Sequence[Log]) -> list[str]:
-    """List the outputs in all logs: the driven mass, and the other mass if measured."""
+    """List the outputs in all logs: the driven mass, and the other mass if measured in all.
+
+    Returns [] without logs.
+    """
     if not logs:
         return []
     return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]

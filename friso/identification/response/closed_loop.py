@@ -142,6 +142,6 @@ def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, flo
 
 
 def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
-    """Check that two responses have the same spectral lines."""
+    """Check that two responses have the same spectral lines. Raises InputError if not."""
     if not np.array_equal(first.frequency, second.frequency):
         raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

@@ -58,7 +58,10 @@ def _sign(response: FrequencyResponse) -> float | None:
 
 
 def _resonances(modes: Modes | None) -> Mapping[str, float]:
-    """Return the frequencies [Hz] of resonances and antiresonances by name, ascending."""
+    """Return the frequencies [Hz] of resonances and antiresonances by name, ascending.
+
+    Returns {} if there are no modes.
+    """
     if modes is None:
         return {}
     frequencies = {

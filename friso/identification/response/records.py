@@ -72,7 +72,10 @@ def from_log(
 
 
 def _check_signal(name: str, values: np.ndarray, least: int) -> None:
-    """Check that a signal is finite, changes, and has enough samples."""
+    """Check that a signal is finite, changes, and has enough samples, at least `least`.
+
+    Raises InputError, with the `name` of the signal, if not.
+    """
     if len(values) < least:
         raise InputError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
     bad = int(np.count_nonzero(~np.isfinite(values)))
@@ -228,7 +231,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
     """Count the leading periods that are transient, by the output (periods, lines).
 
     A period counts as transient if it differs too much from the later half of the others. The limit is so high that a
-    period without a transient is rarely dropped. At least three periods are kept.
+    period without a transient is rarely dropped. At least three periods are kept; of fewer, none counts as transient.
     """
     count = len(reaction)
     last = max(3, count // 2)

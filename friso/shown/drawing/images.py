@@ -72,7 +72,8 @@ def draw_beforehand(figures: Iterable[Figure], images: Iterable[Image]) -> None:
 def drawing_beside() -> Iterator[Artists | None]:
     """Let other processes draw figures in the `with` block.
 
-    The first process loads what it needs at once. Without a second core, no process is started.
+    The first process loads what it needs at once. Without a second core, no process is started, and the block gets
+    None.
     """
     if usable_cores() < 2:
         yield None

@@ -135,7 +135,10 @@ def add_footer(
 
 
 def _key_rows(figure: Figure, width: float) -> int:
-    """Return the number of rows of the legend, in columns as wide as the longest entry."""
+    """Return the number of rows of the legend, in columns as wide as the longest entry.
+
+    It is 0 without entries. `width` [inch] is that of the figure.
+    """
     labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0

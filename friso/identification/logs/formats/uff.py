@@ -96,9 +96,9 @@ def _axis(data: dict[str, Any]) -> np.ndarray:
 
 
 def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
-    """Return the frequency response of a universal file, its frequencies, and any coherence.
+    """Return the frequency response of a universal file, its frequencies [Hz], and its coherence.
 
-    Raises LogError for none and for several.
+    The coherence is None if the file has none. Raises LogError for a file without a response, or with several.
     """
     sets = sets_58(path)
     responses = [data for data in sets if data["func_type"] == FREQUENCY_RESPONSE]
