@@ -68,7 +68,7 @@ class Canvas:
         return "\n".join(line.rstrip() for line in self.lines if line.strip())
 
     def _put(self, line: int, place: int, text: str) -> None:
-        """Write a text at a column of a line, padding the line with spaces up to there."""
+        """Write a text at column `place` of a line, padding the line with spaces up to there."""
         self.lines[line] = f"{self.lines[line]:<{place}}{text}"
 
 

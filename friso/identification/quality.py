@@ -82,8 +82,8 @@ def quality_of(
 ) -> Quality:
     """Judge a fit of moves, and name in sentences what is wrong with it.
 
-    If the fit is `led` by an effect that explains the residual, this effect is named instead of the inverse model's
-    causes.
+    `noise` [N] is the force's, and `cart_share` the fraction of the mass that moves with a measured cart. If the fit is
+    `led` by an effect that explains the residual, this effect is named instead of the inverse model's causes.
 
     The whole model may describe a record that the inverse model, which has no sticking, does not. A cause then raises
     no doubt if the whole model is clearly better than the inverse model corrected for the cause.

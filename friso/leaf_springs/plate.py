@@ -75,7 +75,10 @@ class Curl:
 
 
 def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:
-    """Return sinh(rate s) / sinh(rate L/2), or the same ratio of cosh, without overflow."""
+    """Return sinh(rate s) / sinh(rate L/2) if `odd`, else cosh(rate s) / cosh(rate L/2).
+
+    Neither overflows.
+    """
     half = rate * length / 2
     sign = -1.0 if odd else 1.0
     size = np.abs(s)

@@ -17,9 +17,10 @@ FLOOR = int.from_bytes(b"floor")
 def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int) -> np.ndarray:
     """Return a random acceleration of the floor [m/s^2], shape (n,), every `interval` [s].
 
-    It lasts from 0 to `duration` [s]. There is one wave per frequency of the Fourier transform. The variance of each
-    wave is that of the spectrum in the band around it, so the total variance does not depend on the length of the
-    record. Raises InputError for a spectrum that reaches beyond half the sampling frequency.
+    It lasts from 0 to `duration` [s], and is equal for equal `seed`. There is one wave per frequency of the Fourier
+    transform. The variance of each wave is that of the spectrum in the band around it, so the total variance does not
+    depend on the length of the record. Raises InputError for a spectrum that reaches beyond half the sampling
+    frequency.
     """
     highest = floor.frequency[-1]
     if highest * interval > 0.5:

@@ -62,7 +62,8 @@ def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
     """Return the error of the inverse model with force and motion averaged alike.
 
-    The error serves as a check: averaging the force alone merely hides fast residuals.
+    The force is `lag` samples later, and both are averaged over `width` samples. The error serves as a check: averaging
+    the force alone merely hides fast residuals.
     """
     if width >= 0:
         return np.inf
@@ -77,7 +78,10 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 
 
 def _sentence(lag: int, width: int, step: float) -> str:
-    """Write which shift and which average improve the fit, and what that suggests."""
+    """Write which shift and which average improve the fit, and what that suggests.
+
+    `lag` and `width` are counted in samples of `step` [s]; a negative width averages the force, not the motion.
+    """
     shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
         return f"shifting the force {shift} improves the fit considerably, which suggests a delay between the channels"

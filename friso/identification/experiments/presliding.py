@@ -155,7 +155,10 @@ def _nothing(why: str) -> Presliding:
 
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
-    """Return why a fit shows no bristles; "" if it does."""
+    """Return why a fit shows no bristles; "" if it does.
+
+    `held` is true if the joint counts as held; a stiffness like the joint's then contradicts that.
+    """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"

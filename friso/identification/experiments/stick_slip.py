@@ -128,7 +128,10 @@ def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
 
 
 def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
-    """Return the low-passed actuator force minus the stage's inertia [N]; None without a force."""
+    """Return the low-passed actuator force minus the stage's inertia [N]; None without a force.
+
+    The inertia is `stage_mass` [kg] times the acceleration of the position; both are low-passed at `cutoff` [Hz].
+    """
     if "force" not in log:
         return None
     force = _smooth(log, channel(log, "force"), cutoff)
@@ -288,7 +291,8 @@ def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
 def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
     """Return the mean break-away force of one direction, named `name`.
 
-    It is not determined with fewer than two slips; `why` says why there are none.
+    `relative_error` is that of the scale of the forces. The mean is not determined with fewer than two slips; `why`
+    says why there are none.
     """
     method = "mean of the peaks of the force on the cart before slips"
     if len(forces) < 2:

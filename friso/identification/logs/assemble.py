@@ -153,7 +153,8 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
     """Check that a log is long enough, and that signals that should change do.
 
-    Raises LogError if not, and for samples implausibly close or far apart.
+    Position, force and the `needed` roles should change. Raises LogError if not, and for samples implausibly close or
+    far apart.
     """
     settings = LogSettings.current()
     if base.time.size < settings.samples_of_a_log:

@@ -245,7 +245,7 @@ def _end_with_parent() -> None:
 def main(kind: str, path: Path, memory: int, cpu: float, seconds: float) -> None:
     """Read a file within limits of memory [B], processor time [s] and elapsed time [s].
 
-    The contents, or an error message, are written to standard output.
+    `kind` names the reader. The contents, or an error message, are written to standard output.
     """
     faulthandler.dump_traceback_later(seconds, exit=True)  # this thread does not need the interpreter's lock
     threading.Thread(target=_end_with_parent, daemon=True).start()

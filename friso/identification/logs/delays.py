@@ -115,8 +115,9 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """Write an estimated delay, given in samples; "" if the motion does not show a delay.
+    """Write an estimated delay, given in samples of `period` [s], of one signal behind another.
 
+    `late` and `early` are their names; a negative delay exchanges them. Returns "" if the motion does not show a delay.
     A delay does not show if its interval contains 0, if it is below a quarter of a sample, or if blocks differ by
     samples.
     """

@@ -205,8 +205,8 @@ def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: boo
 def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
     """Return the channel that fits a role best (None without one), and the reason if unclear.
 
-    Channels are compared by unit and first letter, if they change and have no other role. A channel that follows the
-    position, as a reference does, is no force.
+    Channels are compared by unit and first letter, if they change and are not `taken` for another role. A channel that
+    follows the position, as a reference does, is no force.
     """
     fits = _fitting(role, table, taken.values())
     if role == "force":

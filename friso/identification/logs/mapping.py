@@ -146,9 +146,9 @@ def from_options(
 def _pair(
     text: str, option: str, example: str, left: tuple[str, ...] | None = None, last: bool = False
 ) -> tuple[str, str]:
-    """Split a text at its first (or last) equals sign.
+    """Split the text of an option at its first (or last) equals sign.
 
-    Raises LogError for a text without one, or with a left side that is not allowed.
+    Raises LogError, with the `example`, for a text without one, or with a left side that is not in `left`.
     """
     first, sign, second = text.rpartition("=") if last else text.partition("=")
     first, second = first.strip(), second.strip().strip('"')
@@ -160,7 +160,10 @@ def _pair(
 
 
 def guess(what: str, reason: str = "") -> str:
-    """Write a note that an example rests on a guess, to be checked before it is copied."""
+    """Write a note that an example rests on a guess, to be checked before it is copied.
+
+    `what` was guessed; the `reason` may be "".
+    """
     return f" (guessed: {what}{f', {reason}' if reason else ''}; check it)"
 
 

@@ -154,9 +154,9 @@ def is_wanted(name: str) -> bool:
 
 
 def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:
-    """Find the channel with a name, with or without its unit in brackets.
+    """Find the channel with a name, with or without its unit in brackets, for a role.
 
-    Raises LogError that lists the channels.
+    Raises LogError that lists the channels, if there is none or several.
     """
     plain = split_heading(name)[0]
     for matches in ([c for c in table.channels if c.name == name], [c for c in table.channels if c.name == plain]):

@@ -242,7 +242,10 @@ def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
 def _headings(
     lines: Sequence[str], first: int, columns: int, delimiter: str
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units per column from one or two lines above the numbers; () for none."""
+    """Return names and units per column from one or two lines above the numbers; () for none.
+
+    The numbers begin at line `first`, from 0, and have as many `columns`.
+    """
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
     heads = [head[:columns] + _filled(head[columns:]) for head in heads]  # a line may end with a delimiter

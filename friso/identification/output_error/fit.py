@@ -255,7 +255,8 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
     """Finish a fit, and determine the uncertainty of its numbers.
 
-    Standard deviations allow for correlated errors, and for the other inputs that the log allows (`problem.unsettled`).
+    `inner` are the numbers so far, of which those with the indices `free` are fitted. Standard deviations allow for
+    correlated errors, and for the other inputs that the log allows (`problem.unsettled`).
     """
     settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)

@@ -97,7 +97,8 @@ def _identifiable_on_log(
 ) -> IdentifiableFit:
     """Fit the stage that follows the log, and find which parameters it determines.
 
-    `plain` is the fit of the `core` parameters alone. Parameters that the motion cannot show are not tried.
+    `plain` is the fit of the `core` parameters alone, and `noise` [N] is the force's. Parameters that the motion cannot
+    show are not tried.
     """
     names = follows.names
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}

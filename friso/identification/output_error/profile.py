@@ -124,9 +124,10 @@ def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, fl
 
 
 def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
-    """Find where a profile crosses the limit between two values, by their indices.
+    """Find where a profile crosses the limit between two neighbouring values.
 
-    Between them, the square root of the excess cost is taken to grow linearly with distance from the best fit.
+    `outside` is the index of the value with a cost above the limit, `inside` that of the other. Between them, the
+    square root of the excess cost is taken to grow linearly with distance from the best fit.
     """
     if not np.isfinite(cost[outside]):
         return values[inside]

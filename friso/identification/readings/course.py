@@ -199,7 +199,8 @@ def _harmonics(period: np.ndarray) -> float:
 def _rest(position: np.ndarray, samples: int) -> float:
     """Return the fraction of time in which the position hardly moves for a tenth of a period.
 
-    It is 0 for a sine, which moves by 2.4 % of its travel about its turning points.
+    A period has `samples` samples. The fraction is 0 for a sine, which moves by 2.4 % of its travel about its turning
+    points.
     """
     size = max(samples // 10, 2)
     moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)

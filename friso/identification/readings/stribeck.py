@@ -182,7 +182,7 @@ class _Grid:
     def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
         """Return the best curve with its ranges, of `left` degrees of freedom.
 
-        Ranges that reach an `outer` Stribeck velocity or exponent are not closed.
+        `refuted` is stored in the result. Ranges that reach an `outer` Stribeck velocity or exponent are not closed.
         """
         settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
@@ -216,7 +216,11 @@ class _Grid:
         )
 
     def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
-        """Return the covariance of the curve's parameters (SI), linearised at the best curve."""
+        """Return the covariance of the curve's parameters (SI), linearised at the best curve.
+
+        `best` is its place in the grid. Variances are multiplied by `scatter`. With an `open_shape`, the exponent is
+        among the parameters.
+        """
         forces, speeds = self.forces, self.forces.speeds
         velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
         ratio = speeds / velocity

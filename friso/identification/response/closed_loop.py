@@ -58,8 +58,8 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
 def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
     """Test whether the past of the output helps to predict the input.
 
-    Returns the probability (F-test) that the output's past does not help, and the fraction of the input's unpredicted
-    part that it explains.
+    With `direct`, the present sample of the output is no past. Returns the probability (F-test) that the output's past
+    does not help, and the fraction of the input's unpredicted part that it explains.
     """
     settings = ResponseSettings.current()
     target = driven[settings.past_of_the_input :]

@@ -110,9 +110,9 @@ def friction_from_departure(
 ) -> Drag:
     """Return the friction that explains how a response leaves its mass line at low frequency.
 
-    The model 1/(m s^2 + d s + k) is fitted between `limits` [Hz]. Under a broad-band excitation, Coulomb friction F
-    acts as a damper d = sqrt(2/pi) F/(standard deviation of the velocity), as long as the body slides most of the time.
-    `velocities` [output unit/s] are those of the realisations, each of shape (n,).
+    The model 1/(m s^2 + d s + k) is fitted between `limits` [Hz], to the response times `sign`. Under a broad-band
+    excitation, Coulomb friction F acts as a damper d = sqrt(2/pi) F/(standard deviation of the velocity), as long as
+    the body slides most of the time. `velocities` [output unit/s] are those of the realisations, each of shape (n,).
 
     The interval of the friction covers that of the damping. It also covers the difference between normal and sinusoidal
     velocities (gain 4/pi over the amplitude). Raises InputError for fewer than 8 lines.

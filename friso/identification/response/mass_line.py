@@ -151,7 +151,8 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
 def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndarray, ...]:
     """Return frequency, log level, phase off the line, and relative deviation, each (lines,).
 
-    The response is multiplied by (i omega)^`slope`, so that a straight line of this slope is level.
+    The response is multiplied by `sign` and (i omega)^`slope`, so that a straight line of this slope is level and its
+    phase is 0.
     """
     value = sign * response.response * (2j * np.pi * response.frequency) ** slope
     relative = response.scatter() / np.abs(response.response)

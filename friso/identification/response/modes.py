@@ -87,7 +87,10 @@ def _described(shape: RationalShape, rows: list[Row]) -> str:
 
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
-    """Yield a sentence for each resonance within the band that an antiresonance nearly cancels."""
+    """Yield a sentence for each resonance within the band that an antiresonance nearly cancels.
+
+    `band` is in Hz. Poles and zeros times `scale` are frequencies in Hz.
+    """
     settings = ResponseSettings.current()
     poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
@@ -124,7 +127,10 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """Return a function of the parameters that follows a pole or zero: the nearest to `root`."""
+    """Return a function of the parameters that follows a pole or zero: the nearest to `root`.
+
+    It is a pole if `which` is 0, and a zero if it is 1.
+    """
 
     def nearest(parameters: np.ndarray) -> complex:
         candidates = poles_and_zeros(parameters, shape)[which]

@@ -53,8 +53,8 @@ class Row(NamedTuple):
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
     """Fit models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
 
-    The last result is the best of these models with a constant added. `s` are complex frequencies over a scale,
-    (lines,).
+    The models have a `rigid` body or not. The last result is the best of these models with a constant added. `s` are
+    complex frequencies over a scale, (lines,).
     """
     rows: list[Row] = []
     nonlinear = np.zeros(2)

@@ -54,8 +54,9 @@ class ResponseRecord:
 def from_log(
     log: Log, driving: str = "force", output: str = "position", reference: str | None = None
 ) -> tuple[ResponseRecord, Channels]:
-    """Return the longest segment of a log as a record, by roles, with names and units.
+    """Return the longest segment of a log as a record, and the names and units of its channels.
 
+    `driving` is the role of the input, `output` that of the output; the `reference` is the role of an external signal.
     Raises InputError for a role that is missing.
     """
     roles = [driving, output] + ([reference] if reference else [])

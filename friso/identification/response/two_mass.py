@@ -179,7 +179,11 @@ def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
 
 
 def _start(other: float, stiffness: float, damping: float, outputs: int) -> np.ndarray:
-    """Return the parameters of a start with a total mass of 1, in logarithms."""
+    """Return the parameters of a start with a total mass of 1, in logarithms.
+
+    `other` is the fraction of the mass beyond the joint; `outputs` is the number of outputs. Friction, delay and
+    compliances begin at 0.
+    """
     return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(BEYOND - DRAG + COMPLIANCES + outputs)])
 
 

@@ -181,13 +181,16 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 
 
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
-    """Return markers with prefixed coordinates."""
+    """Return markers with their coordinates times the factors of both axes."""
     finite = np.isfinite(markers.x) & np.isfinite(markers.y)
     return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
 
 
 def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:
-    """Return a map or cloud with prefixed axes and numbers; infinite numbers become gaps."""
+    """Return a map or cloud with prefixed axes and numbers; infinite numbers become gaps.
+
+    Coordinates are multiplied by the factors of both axes.
+    """
     z = np.where(np.isfinite(field.z), field.z, np.nan)
     factor, unit = colour_prefix(field)
     limits = None if field.limits is None else (field.limits[0] * factor, field.limits[1] * factor)

@@ -61,7 +61,7 @@ def pretty(unit: str) -> str:
 
 
 def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
-    """Write a value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash without a value."""
+    """Write a value [unit] with significant `digits`, e.g. "0.52 mm"; a dash without a value."""
     if value is None or not math.isfinite(value):
         return NOTHING
     factor, text = choose(np.array([value]), unit)

@@ -96,7 +96,7 @@ def _axis(data: dict[str, Any]) -> np.ndarray:
 
 
 def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
-    """Return the frequency response of a universal file, its frequencies [Hz], and its coherence.
+    """Return the frequency response of a universal file, its frequencies [Hz] and coherence.
 
     The coherence is None if the file has none. Raises LogError for a file without a response, or with several.
     """
