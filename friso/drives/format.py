@@ -67,7 +67,7 @@ class AxisParameters:
         return value
 
     def flag(self, name: str, default: bool = False) -> bool:
-        """Tell whether a switch is on.
+        """Tell whether a switch is on; an absent one is as `default` says.
 
         Raises InputError if its value is neither true nor false, 0 nor 1.
         """

@@ -40,8 +40,8 @@ class Gains:
 def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None) -> Gains:
     """Return the gains of a stage, and the parameters of the drive `to` if one is named.
 
-    Raises InputError for a controller that the drive does not have. Values that are still missing are refused
-    together.
+    `user_values` are the user's answers to what the drive needs besides. Raises InputError for a controller that the
+    drive does not have, for an answer that nothing asks for, and for all missing answers together.
     """
     flat = stage.flat()
     answers = UserAnswers({**_told(stage, flat), **user_values})

@@ -212,7 +212,10 @@ def _held(
 
 
 def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return the stage's stiffness along y and about x and z, with the stage turned about y."""
+    """Return the stage's stiffness (3, 3) along y and about x and z.
+
+    The stage is turned about y by `turn` [rad]. `stiffness` and `forces` are those of the leaves' nodes.
+    """
     offsets, tilt = mechanism.offsets, np.cos(turn)
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 1] = -tilt * offsets

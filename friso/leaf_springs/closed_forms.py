@@ -148,7 +148,7 @@ def _mode_stiffening(mechanism: Mechanism) -> Any:
 
 
 def leaf_torsion(mechanism: Mechanism) -> Any:
-    """Return the frequency of the first torsional mode of a leaf between its clamps.
+    """Return the frequency [Hz] of the first torsional mode of a leaf between its clamps.
 
     The frequency follows from Rayleigh's quotient for the twist under a constant torque along the leaf.
     """

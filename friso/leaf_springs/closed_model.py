@@ -52,7 +52,10 @@ def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
 
 
 def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
-    """Build a mode from the stage's six coordinates and the bending of the leaves."""
+    """Build a mode from its frequency [Hz] and its shape at unit modal mass, (7,).
+
+    The shape has the stage's six coordinates, then the bending of the leaves.
+    """
     stage, leaves = shape[:6], following(mechanism, shape[:6])
     leaves[:, :, 2] += shape[6] / np.sqrt(mechanism.leaves * mechanism.leaf_mass) * _clamped_shape()
     actuator, sensor = (

@@ -51,7 +51,7 @@ def entries() -> Mapping[str, GlossaryRow]:
 
 @cache
 def _any_word() -> re.Pattern[str]:
-    """Return a pattern for any of the words or its plural; longer words come first."""
+    """Return a pattern for any word of the glossary or its plural; longer words come first."""
     words = sorted(entries(), key=len, reverse=True)
     return re.compile(rf"(?<![\w-])({'|'.join(map(re.escape, words))})s?(?![\w-])", flags=re.IGNORECASE)
 

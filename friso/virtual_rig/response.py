@@ -74,7 +74,10 @@ def measured_response(stage: Stage, response: xr.Dataset) -> Measures:
 
 
 def _dataset(stage: Stage, flat: dict[str, Any], recorded: RecordedRuns, rtol: float) -> xr.Dataset:
-    """Return the signals of a recorded run over time as a dataset, with units, names and status."""
+    """Return the signals of a recorded run over time as a dataset, with units, names and status.
+
+    `rtol` is the solver's relative tolerance, which is stored as an attribute.
+    """
     import xarray as xr
 
     from friso.engine.kernel import kernel

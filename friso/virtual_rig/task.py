@@ -66,7 +66,7 @@ def own_motion(stage: Stage) -> MoveTask:
 def motion_task(flat: Mapping[str, Any], runs: int) -> MoveTask:
     """Return the motions of stages given as flat keys, each from 0 or from a displacement.
 
-    A reference that begins with a step jumps after one sample of the drive. All runs have the longest duration.
+    A reference that begins with a step jumps after one sample of the drive. All `runs` have the longest duration.
     """
     several = motion.varies(flat)
     pieces = motion.pieces(flat, runs if several else 1)

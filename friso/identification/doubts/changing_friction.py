@@ -74,8 +74,8 @@ def changing_forces(
 ) -> tuple[list[np.ndarray], list[float], list[np.ndarray]]:
     """Build the forces by which friction and a constant force could change along a record.
 
-    `velocity` [m/s] is the record's. Each force, shape (n,), rises along a straight line in either half of the record.
-    Also returns the sizes [N] at which forces are tried, and the shapes of the lines.
+    `velocity` [m/s] is the record's. Each force, shape (n,), changes along a straight line in either half of the
+    record. Also returns the sizes [N] at which forces are tried, and the shapes of the changes.
     """
     settings = DoubtSettings.current()
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")

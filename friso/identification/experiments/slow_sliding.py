@@ -255,8 +255,8 @@ def _estimates(
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """Convert fitted logarithms to friction and Stribeck velocity, with their correlation.
 
-    The logarithms have a covariance, shape (3, 3), and possible `shifts`, shape (m, 3); `left` is the unexplained
-    fraction of the friction.
+    `best`, shape (5,), are the fitted numbers, of which the first three count. They have a covariance, shape (3, 3),
+    and possible `shifts`, shape (m, 3); `left` is the unexplained fraction of the friction.
     """
     settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])

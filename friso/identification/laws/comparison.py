@@ -64,7 +64,7 @@ class LawComparison:
 
     @property
     def explained(self) -> bool:
-        """Tell whether any law predicts the record."""
+        """Tell whether any law predicts the left-out parts of the record."""
         return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property

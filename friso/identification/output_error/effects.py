@@ -32,8 +32,8 @@ class ExplainedResidual:
     def is_sure(self, fit: OutputErrorFit) -> bool:
         """Tell whether the last force is present: its size differs from 0 by more than its error.
 
-        The error allows for correlation: it repeats at every reversal. For a slow sine, a coupling or a delay then
-        looks like slightly different friction.
+        The error allows for residuals that repeat at every reversal. With a slow sine, a coupling or a delay cannot
+        then be told from slightly different friction.
         """
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)
@@ -84,7 +84,7 @@ def explained_by(
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
     """Tell whether the last force is needed even if all parameters of the model may change.
 
-    `units` are the sizes [N] at which the forces are simulated.
+    `forces` [N], shape (n,) each, have size 1; `units` are the sizes at which they are simulated.
     """
     rest, slopes = beside_all_numbers(fit)
     explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)

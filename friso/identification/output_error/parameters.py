@@ -170,7 +170,10 @@ def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: n
 
 
 def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn values of parameters, numbers or arrays, into SI values of keys of the stage file."""
+    """Turn values of fit parameters, by name, into SI values of keys of the stage file.
+
+    Values are numbers or arrays; `flat` is the stage before the fit.
+    """
     keys = {name: value for name, value in values.items() if name not in (MASS, SHARE, RATIO)}
     bodies = [name for name in ("masses.cart", "masses.stage") if name in flat]
     total = sum(flat[name] for name in bodies)

@@ -19,10 +19,10 @@ def stiffness_of_loading(
     """Estimate the stiffness [N/m] of a joint that is loaded between slips of the cart.
 
     The deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the actuator's force [N] are
-    low-passed, shape (n,); each of the `loads` lies between two slips.
+    low-passed, shape (n,). `loads` are the samples between slips, in which the cart sticks and the joint is loaded.
 
     Least squares fits a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
-    joint. The error is by the jackknife over loads. The cart's creep drops out. With fewer than three loads the
+    joint. The error is by the jackknife over loads. Creep of the cart does not matter. With fewer than three loads the
     stiffness is unknown.
     """
     settings = ReadingSettings.current()

@@ -150,10 +150,9 @@ class _Grid:
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
-        """Return a grid around the possible region with `left` degrees of freedom.
+        """Return a grid around the curves that the forces allow with `left` degrees of freedom.
 
-        The new grid reaches beyond this one where the possible region does. If no curve is possible, this grid is
-        returned.
+        The new grid reaches beyond this one where these curves do. If no curve is possible, this grid is returned.
         """
         settings = ReadingSettings.current()
         grid = self
@@ -170,10 +169,10 @@ class _Grid:
         return grid
 
     def room(self, left: int) -> np.ndarray:
-        """Return how far the cost of each grid point is below the limit of the possible region.
+        """Return how far the cost of each grid point is below the limit for a possible curve.
 
-        The result has the shape (velocities, exponents), and is negative outside. `left` is the number of degrees of
-        freedom.
+        The result has the shape (velocities, exponents), and is negative where the forces exclude the curve. `left` is
+        the number of degrees of freedom.
         """
         least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
         least = np.where(np.isfinite(least), least, 0.0)

@@ -258,7 +258,7 @@ def _friction(
 def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
     """Return the input over the last whole period.
 
-    Raises InputError where nothing repeats.
+    `period` [s] is the approximate period; None means that it is searched. Raises InputError where nothing repeats.
     """
     periods = find_periods(record.driving, None if period is None else period / record.sample_time)
     return record.input[periods.stop - periods.samples : periods.stop]

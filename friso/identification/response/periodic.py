@@ -94,7 +94,10 @@ def _first_lines(realisation: Spectra, count: int) -> Spectra:
 
 
 def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the response and its deviation by noise, each (lines,)."""
+    """Return the response and its deviation by noise, each (lines,), from all realisations.
+
+    `excited` marks the lines that count.
+    """
     outputs, inputs = _relative(records, excited)
     gain = inputs.mean(axis=0)
     response = outputs.mean(axis=0) / gain

@@ -199,7 +199,10 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
 
 
 def _same_excitation(driving: np.ndarray) -> np.ndarray:
-    """Tell in which periods the external signal is the same as in most periods."""
+    """Tell in which periods the external signal is the same as in most, shape (periods,).
+
+    `driving`, shape (periods, lines), is its spectrum.
+    """
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
     return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))

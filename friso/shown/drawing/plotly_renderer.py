@@ -243,7 +243,7 @@ def _plot_height(figure: Figure, width: int) -> int:
 
 
 def _columns(column: int, columns: int) -> tuple[float, float]:
-    """Return the left and right end of a column as fractions of the width."""
+    """Return the left and right end of column number `column` as fractions of the width."""
     width = (1 - GAP * (columns - 1)) / columns
     left = column * (width + GAP)
     return left, min(1.0, left + width)
