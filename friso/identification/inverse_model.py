@@ -87,7 +87,10 @@ def smoothed(position: np.ndarray, sample_time: float, cutoff: float) -> np.ndar
 
 @lru_cache
 def _smoothing(order: int, cutoff: float) -> np.ndarray:
-    """Design a Butterworth filter (cached); the cut-off is relative to half the sampling rate."""
+    """Design a Butterworth low-pass of an order (cached).
+
+    `cutoff` is relative to half the sampling rate.
+    """
     return np.asarray(butter(order, cutoff, output="sos"))
 
 

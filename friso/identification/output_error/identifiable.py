@@ -219,7 +219,10 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
-    """Tell whether the motion covers the speeds or displacements at which a parameter acts."""
+    """Tell whether the motion covers the speeds or displacements at which a parameter acts.
+
+    Bristles must also swing slowly enough to be sampled. True for parameters that act in any motion.
+    """
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:

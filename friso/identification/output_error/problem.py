@@ -327,7 +327,7 @@ def _shaking(log: Log, part: slice, cutoff: float) -> float:
     """Return the velocity noise [m/s] below `cutoff` [Hz] that matters beside the force noise.
 
     Noise counts if the velocity was integrated, since it accumulates in the position, or if the force is a command
-    without noise of its own.
+    without noise of its own. Otherwise the result is 0.
     """
     band = min(cutoff, 0.5 / log.sample_time)
     if log.is_integrated:

@@ -63,17 +63,17 @@ def channel(log: Log, role: str) -> np.ndarray:
 
 
 def deflection(log: Log) -> np.ndarray | None:
-    """Return the stage's position minus the cart's [m], shape (n,); None if the log has neither.
+    """Return the stage's position minus the cart's [m], shape (n,).
 
-    It is measured, or computed from a stage and a cart sensor.
+    It is measured, or computed from a stage and a cart sensor; None if the log has neither.
     """
     return _apart(log, "relative_position", "cart_position")
 
 
 def cart(log: Log) -> np.ndarray | None:
-    """Return the position of the cart [m], shape (n,); None if the log does not show it.
+    """Return the position of the cart [m], shape (n,).
 
-    It is measured, or the stage's position minus the measured deflection.
+    It is measured, or the stage's position minus the measured deflection; None if the log has neither.
     """
     return _apart(log, "cart_position", "relative_position")
 

@@ -221,7 +221,8 @@ def _no_repeatability(reason: str) -> Estimate:
 def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float], ...]) -> Estimate:
     """Estimate the mean correlation of the pairs, with its interval by Fisher's z.
 
-    The number of independent places is the number of correlation lengths in a pass.
+    The shortest pass counts as one independent place for every two correlation lengths, at least four. The
+    repeatability is not determined without pairs, or if none of the `maps` shows a correlation length.
     """
     if not pairs:
         return _no_repeatability("no two passes over the same places")
@@ -254,8 +255,8 @@ def _from_to(values: list[float]) -> str:
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
     """Tell whether the force is the friction of the rail, and say in a sentence why or why not.
 
-    It is not if a pass is unsteady, if passes over equal places differ, or if it varies faster than the loop's
-    `crossover` [Hz].
+    The force is not friction of the rail if a pass is unsteady, or if passes over equal places differ. Neither is it if
+    it varies faster than the loop's `crossover` [Hz].
     """
     reasons = []
     rough = [m for m in maps if not m.steady]

@@ -129,8 +129,8 @@ def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
 def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
     """Return the relative errors of the two-mass model in predicting another log's outputs.
 
-    The errors are taken over the band of the model. `period` [s] is the period of the log's excitation. Raises
-    InputError if there is no model.
+    The errors are taken over the band of the model. `period` [s] is the approximate period of the log's excitation
+    (default: searched). Raises InputError if there is no model.
     """
     if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")

@@ -87,7 +87,7 @@ def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
 
 
 def _words(line: StraightLine) -> str:
-    """Return a straight line in words."""
+    """Return in words which straight line it is, with its value and its range of frequency."""
     value = line.value
     text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
     return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
