@@ -18,10 +18,11 @@ from friso.hunting.settings import EdgeSettings
 
 @dataclass(frozen=True)
 class CycleDerivatives:
-    """The limit cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
+    """The limit cycle of a stage, with derivatives of its amplitude and period by keys.
 
     It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` is true if
-    it is stable; `amplitude` [m] and `period` [s] are its size.
+    it is stable; `amplitude` [m] and `period` [s] are its size. `amplitude_by` and `period_by`, shape (keys,), are
+    derivatives by the keys' SI values.
     """
 
     attracts: bool

@@ -266,7 +266,10 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,)."""
+    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,).
+
+    `output` names the friction force among the model's outputs.
+    """
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
@@ -292,7 +295,10 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
 
 
 def _force(stages: Ensemble, states: np.ndarray, output: str) -> np.ndarray:
-    """Return a force [N] among the outputs, shape (count,)."""
+    """Return the force [N] that is the model's `output` of this name, shape (count,).
+
+    Stages are in `states`, shape (count, states).
+    """
     kernel = stages.kernel
     modes = kernel.modes(states.T, 0.0, np.zeros(3), stages.values)
     rows = kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), stages.values)

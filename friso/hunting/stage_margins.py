@@ -71,8 +71,9 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
     """Tell whether a stage with a controller faster by `factor` stays quiet at other friction.
 
-    Static friction is multiplied and divided by the factor by which advice keeps away from an edge. Returns None if
-    this takes more than the given work, or is not certain.
+    Static friction is multiplied and divided by the factor by which advice keeps away from an edge; it stays at least
+    Coulomb friction. Returns None for a law that lacks one of both. Returns None as well if this takes more than the
+    given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

@@ -117,7 +117,7 @@ def _enclosed(
     def distance(place_along: float) -> float:
         """Return how far the multiplier is from its special value, at a length along the branch.
 
-        The difference has a sign. Raises Unreached.
+        The difference has a sign. Raises Unreached if no cycle can be closed there.
         """
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
@@ -261,9 +261,10 @@ def corrected(
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
-    """Locate all points of a branch where a multiplier passes the unit circle.
+    """Locate the points of a branch where a multiplier passes the unit circle.
 
-    A fold at which asymmetric cycles only meet the symmetric one is left out.
+    A fold at which asymmetric cycles only meet the symmetric one is left out. A point next to which cycles cannot be
+    closed is left out, too.
     """
     specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [special for special in specials if special and not _meets_symmetric(tracer, special)]

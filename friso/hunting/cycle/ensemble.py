@@ -41,7 +41,10 @@ class Ensemble:
 
     @classmethod
     def held(cls, flat: Mapping[str, Any], count: int, **options: Any) -> Ensemble:
-        """Make an ensemble of stages with their reference held at 0 instead of their motion."""
+        """Make an ensemble of stages with their reference held at 0 instead of their motion.
+
+        `flat` has the keys of `count` stages in SI, and `options` are further fields.
+        """
         if (form := options.get("form")) is not None:
             options["form"] = form.standing
         return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
@@ -160,9 +163,9 @@ class Ensemble:
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state at which the actuator relaxes, per displacement [s], (count,).
+        """Return the integrator state [s] at which a displaced stage's actuator relaxes, (count,).
 
-        The actuator then exerts the force that it exerts at the reference.
+        It is given per displacement. The actuator then exerts the force that it exerts at the reference.
         """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
@@ -240,9 +243,10 @@ class Ensemble:
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Return which runs end in the switched modes in which they began, shape (count,).
+        """Return which runs end with equal modes with memory as they began, shape (count,).
 
-        Runs begin in `states` and end in `ends` (count, kept).
+        Runs begin in `states`, shape (count, states). `ends`, shape (count, kept), are their final states, followed by
+        the modes with memory.
         """
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)

@@ -80,7 +80,7 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 def _straight(pairs: np.ndarray) -> float:
     """Fit a straight line without outliers to pairs (points, 2), and return its slope.
 
-    The slope is NaN with too few pairs. A stage that does not break away makes an outlier.
+    The slope is NaN if too few pairs are left. A stage that does not break away makes an outlier.
     """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:

@@ -296,9 +296,10 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return by how much paths fail to repeat: the least difference from any cycle earlier.
+    """Return how far paths are from repeating, in coordinates on the map, shape (points,).
 
-    Paths are coordinates on the map, shape (points, landings); the result has the shape (points,).
+    Every landing is compared with the one some swings earlier, and the number of swings that fits best counts. Paths
+    are coordinates on the map, shape (points, landings).
     """
     settings = SurveySettings.current()
     return np.min(
