@@ -47,7 +47,8 @@ class DrivenPlant:
         """Return the forces [N] that move the cart by amplitudes [m], shape (count,).
 
         `which` numbers the frequencies. Also returns the positions of stage and cart over the forces [m/N], complex,
-        (count, 2), and the dynamic stiffness of friction [N/m].
+        (count, 2), and the dynamic stiffness of friction [N/m]. Results are NaN or infinite where friction was not
+        found.
         """
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         compliances = self.compliances[which]

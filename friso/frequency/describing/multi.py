@@ -130,7 +130,11 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return in words whether a series is a motion, near one of the amplitude `length` [m]."""
+    """Return "done" if a series is a motion of the stage, and otherwise why it is none.
+
+    It is none if Newton's method did not converge, or if the limiter would be touched. Nor is it if its amplitude is
+    tiny against the known motion's, `length` [m], so that the stage rests.
+    """
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
