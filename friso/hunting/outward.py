@@ -207,7 +207,7 @@ class EdgeSearch:
         return Ensemble.held(faster(self.flat, factors), len(factors))
 
     def _ahead(self, at: float) -> float:
-        """Return the direction of the search from a factor: 1 up, -1 down."""
+        """Return the direction of the search from the bandwidth factor `at`: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:

@@ -146,7 +146,10 @@ def place_verdicts(result: Diagram) -> list[str]:
 
 
 def end_verdicts(result: Diagram) -> tuple[str, str]:
-    """Return the verdicts at the lower and the upper end of the range of a diagram."""
+    """Return the verdicts at the lower and the upper end of the range of a diagram.
+
+    An end at which no stage was simulated counts as invalid.
+    """
     verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
     return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
 

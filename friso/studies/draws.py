@@ -68,7 +68,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     """Judge the drawn stages in each variant: as in the file and, with a joint, locked and free.
 
     The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then,
-    without amplitudes and periods of hunting.
+    without amplitudes and periods of hunting. Raises KeyboardInterrupt if there are none yet.
     """
     settings = StudySettings.current()
     variants = different(stage)

@@ -181,8 +181,9 @@ class Ensemble:
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
         """Return how far the integrators of sticking stages are from balancing constant forces.
 
-        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), and the
-        result (count,). For the stage `number` alone, they are (n, states) and (n,).
+        The result is in the unit of the integrator's state, with a sign. Only constant forces that friction does not
+        hold need balance. `states` have the shape (count, states), and the result (count,). For the stage `number`
+        alone, they are (n, states) and (n,).
         """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]

@@ -243,8 +243,8 @@ class LandingMap:
         """Return the largest relative error of a landing predicted by neighbours, and where it is.
 
         The place is a signed distance. The error is infinite if a stage rests between two landings that continue alike,
-        or the reverse. It is 0 if no three points are close together. Only points whose next landing is at more than
-        half of their distance count.
+        or the reverse. It is 0, and the place NaN, if no three points are close together. Only points whose next
+        landing is at more than half of their distance count.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan

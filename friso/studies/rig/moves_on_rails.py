@@ -252,7 +252,7 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and values [m] of the turning points of a sampled deviation.
 
-    A flat stretch counts as a turn at its end.
+    Where the deviation stays level at a turn, the last of the level samples counts.
     """
     ways = np.sign(np.diff(values))
     moving = np.flatnonzero(ways)
