@@ -41,7 +41,10 @@ class Spot:
 
     @property
     def error(self) -> np.ndarray:
-        """Return the error of the point's coordinates along each key, shape (2,)."""
+        """Return the error of the point's coordinates along each key, shape (2,).
+
+        It is infinite if the error is not known.
+        """
         if not np.isfinite(self.special.error):
             return np.full(2, np.inf)
         return np.abs(self.special.error * self.across)

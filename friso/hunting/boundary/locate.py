@@ -42,7 +42,8 @@ class LocatedPoint:
     def in_doubt(self, point: Point) -> bool:
         """Tell whether a cycle of the branch is so near this point that its stability is unknown.
 
-        It is if the cycle lies within the error of the special point.
+        It is if the cycle lies within the error of the special point and has almost its size. The result is false if
+        that error is not known (infinite).
         """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)

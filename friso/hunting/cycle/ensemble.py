@@ -225,10 +225,11 @@ class Ensemble:
     ) -> Results:
         """Run each stage from its state in `starts` for its duration [s].
 
-        A run begins in the switched modes that belong to its state. The `ends` of the result are states alone, or with
-        the modes if `with_modes`. With `variational`, deviations from the run are integrated too; they may be `along`
-        keys (see `KernelRequest`), by the values of the stage's keys. Turning points are kept only with `least_swing`,
-        because a limiter that chatters makes too many. `run_options` are fields of `RunOptions`.
+        A run begins in the modes with memory that belong to its state. The `ends` of the result are states alone, or
+        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too. With
+        `along`, they lead to a motion in which these keys differ, by differences that stand in `flat` (see
+        `KernelRequest`). Turning points are kept only with `least_swing`, because a limiter that chatters makes too
+        many. `run_options` are fields of `RunOptions`.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)

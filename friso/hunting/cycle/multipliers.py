@@ -101,7 +101,7 @@ def returns_of(
     """Measure how far stages swing [m] on each return, (count, points, returns).
 
     Runs begin beside their orbits, along a direction (count, states), at fractions (1, points) of the sticking
-    distance.
+    distance. Returns that a run does not make are NaN.
     """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]
