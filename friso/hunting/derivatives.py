@@ -94,7 +94,7 @@ def _extremes(
     """Return half of peak to peak of the position on an orbit, and its derivatives by the keys.
 
     `moved` (states, keys) are the derivatives of the orbit's state by the keys. Returns None if a run was not
-    completed.
+    completed, or turned less than twice.
     """
     whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
     results = stages.run(orbits.states, whole, rtol, least_swing=0.0)
@@ -118,7 +118,8 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 
     The result is the relative change of the edge per relative change of the key. The edge lies at `factor` times the
     bandwidth of the stage, everything else unchanged. Along the edge the multiplier keeps its value; its derivatives
-    are central differences. Returns None if no cycle flips there.
+    are central differences. Returns None if no cycle flips there, if a limiter may chatter, or if an orbit could not be
+    closed.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))

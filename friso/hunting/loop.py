@@ -59,8 +59,9 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
     Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains, with the viscous friction of the
-    direction that has less. The result is "unknown" if the controller does not name the keys of its gain. It is so too
-    if the controller acts differently near the reference and far from it, which the linear loop at rest does not show.
+    direction that has less. The result is "unknown" if the controller does not name the keys of its gain. It is also
+    "unknown" if the controller acts differently near the reference and far from it, which the linear loop at rest does
+    not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
     the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m

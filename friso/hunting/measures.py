@@ -62,6 +62,8 @@ class Measures:
     - `largest_force` [N]: of the actuator.
     - `status`, `steps` attempted and `rejected`: of the solver.
     - `turns`: which turning points are counted peaks, shape (runs, room).
+
+    A run that was not completed has no peaks, and NaN for the other numbers on its motion.
     """
 
     peaks: np.ndarray

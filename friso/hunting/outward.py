@@ -110,7 +110,10 @@ class EdgeSearch:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way."""
+        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way.
+
+        Raises Beyond if an attractor exists up to the end of the search.
+        """
         for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
@@ -162,7 +165,7 @@ class EdgeSearch:
         """Narrow down the edge by surveys where no orbit can be followed to it.
 
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
-        them until they are close together.
+        them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
         """
         settings = EdgeSettings.current()
         reach, ahead = settings.reach_log, self._ahead(place.at)

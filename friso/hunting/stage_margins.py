@@ -37,8 +37,8 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
     """Find what change in stroke and stiffness of a free joint starts or ends hunting.
 
-    The range is given by `SEARCH_LIMITS`. The margins are listed by key. There is none for a stage that cannot hunt, or
-    whose attractors are unknown.
+    The range is given by `SEARCH_LIMITS`. The margins are listed by key. There is none without a free joint, for a
+    stage that cannot hunt, or for one whose attractors are unknown.
     """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):

@@ -193,7 +193,10 @@ class Hunting:
 
     @property
     def possible(self) -> bool:
-        """Tell whether the stage has friction to stick to and integral action that winds up."""
+        """Tell whether the stage was searched: it has friction or a backlash, and an integral.
+
+        The result is false for a stage with dither, and for one whose reference never stands still.
+        """
         return self.returns is not None
 
 
