@@ -162,7 +162,8 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     """Return zeros of many functions between ends of opposite sign, and the remaining values.
 
-    The method takes the secant of the bracket, and halves the value at an end that stays (Illinois).
+    `ends` are the lower and upper ends, `values` the functions there. The method takes the secant of the bracket, and
+    halves the value at an end that stays (Illinois).
     """
     settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)
