@@ -1,8 +1,8 @@
 """Find the edge of hunting in bandwidth: the factor beyond which the stage has no attractor.
 
-A closed orbit is followed through the bandwidth to its end: a flip, a fold, or the loss of the orbit. If another
-attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed,
-surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, a torus, or the loss of the orbit. If
+another attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be
+followed, surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
 """
 
 from __future__ import annotations
