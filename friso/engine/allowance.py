@@ -43,7 +43,7 @@ class Allowance:
 
     @property
     def left(self) -> float:
-        """Return the work that may still be used."""
+        """Return the work that may still be used, by this allowance and those around it."""
         own = self.work - self.used
         return own if self.around is None else min(own, self.around.left)
 

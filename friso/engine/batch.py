@@ -202,7 +202,7 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     """Run a batch within the allowance of work, if there is one.
 
     Each run gets an equal part of the remaining steps. The few runs that need more are repeated with the steps that the
-    others left. Raises Exhausted if these are hardly more than the first part.
+    others left. Raises Exhausted if a repetition would hardly allow more steps than the run before.
     """
     allowance = current_allowance()
     if allowance is None:

@@ -35,8 +35,8 @@ _AT_THE_END = 2.0
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """Return the requested cache entries, and build missing ones, with messages in the log.
 
-    Raises RuntimeError with the builder's message if that fails, OSError if no folder can be written, and Overtaken if
-    nobody waits for the entries any more; builds in progress are then finished for later requests.
+    Raises RuntimeError with the builder's message if a build fails, and OSError if no folder can be written. Raises
+    Overtaken if nobody waits for the entries any more; builds in progress are then finished for later requests.
     """
     requests, folder = list(requests), cache_folder()
     compiled = {request: request.entry() for request in requests}
@@ -67,8 +67,8 @@ class _Work:
     def finish(self, requests: list[CodeRequest]) -> None:
         """Fulfil all requests, and wait until they are.
 
-        If this ends early, jobs for which nobody else waits are ended. If nobody waits for the results any more, jobs
-        already being compiled go on.
+        If an error ends the wait early, jobs for which nobody else waits are ended. If nobody wants the results any
+        more (Overtaken), jobs already being compiled go on.
         """
         requests = list(dict.fromkeys(requests))
         jobs: list[_Job] = []
@@ -172,7 +172,10 @@ class _Job:
             builder.kill()
 
     def announce(self) -> None:
-        """Announce once to all waiting threads that the job is being built."""
+        """Tell the asker in whose thread this is called, once, that the job is being built.
+
+        The message goes to the log. Nothing is said before building begins.
+        """
         asker = ASKER.get()
         if self.builds and asker not in self._announced:
             self._announced.add(asker)

@@ -159,7 +159,7 @@ class Compiled:
     code: bytes
 
     def module(self) -> ModuleType:
-        """Return the module after execution."""
+        """Execute the module, and return it."""
         return _module(self.name, self.source, marshal.loads(self.bytecode))
 
 
@@ -299,7 +299,7 @@ class _Loader(InspectLoader):
 
 
 def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
-    """Return the module of an entry after execution."""
+    """Run the code of a cache entry as a module with this name, and return the module."""
     loader = _Loader(source, compiled)
     spec = spec_from_loader(Path(_file_name(name)).stem, loader)
     assert spec is not None

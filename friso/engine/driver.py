@@ -133,7 +133,8 @@ def note_entry(B, layout, lane, row, fraction, start, end, band):
 def note_turn(B, layout, lane, fraction, batch, settings, results):
     """Record the turning point of a run's deviation inside its last step, if there is one.
 
-    Only the `fraction` of the step that was accepted counts. The run is the one in `lane`.
+    It counts for the extremes, for the last times outside both bands, and as a turning point to be stored. Only the
+    `fraction` of the step that was accepted counts. The run is the one in `lane`.
     """
     before, after = deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
@@ -251,9 +252,10 @@ def enter_segment(B, layout, lane, j, segment, batch):
 
 
 def walk(B, layout, lane, w):
-    """Return how far a run is along the axis of some of its tables, in points.
+    """Return how far a run is along the axis of some of its tables, in points of the tables.
 
-    `w` numbers the quantities over which tables are looked up: some states, and then time.
+    `w` numbers the quantities over which tables are looked up: some states, and then time. Before the first point the
+    result is 0, and it does not go beyond the last cell.
     """
     timed = w == layout.place_states.size
     axis = (layout.axis + (AXIS_ROWS if timed else 0)) * layout.lanes + lane

@@ -25,7 +25,10 @@ class NumberKind:
         return "d" if self.name == "float" else "q"
 
     def words(self, value: Any) -> list[Any]:
-        """Return the words of a number. Raises TypeError for a value of another kind."""
+        """Return a number as a list of one value, for one 64-bit word.
+
+        Raises TypeError for a value of another kind.
+        """
         if not isinstance(value, float if self.name == "float" else int):
             raise TypeError(f"{value!r} where a number is expected: {self.name}")
         return [value]
@@ -47,9 +50,9 @@ class ArrayKind:
         return "q" * (1 + self.dimensions)
 
     def words(self, value: Any) -> list[Any]:
-        """Return the address of an array, and its shape.
+        """Return the address of an array and its shape, as values for 64-bit words.
 
-        Raises TypeError for arguments of other kinds.
+        Raises TypeError for an array of another type or number of dimensions, or one that is not contiguous.
         """
         if not (value.dtype == _DTYPES[self.dtype] and value.ndim == self.dimensions and value.flags.c_contiguous):
             raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
@@ -68,7 +71,10 @@ class RecordKind:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
-        """Return the words of the record's fields, one field after another."""
+        """Return the fields of a named tuple as values for 64-bit words, one field after another.
+
+        Raises TypeError if a field is of another kind.
+        """
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 

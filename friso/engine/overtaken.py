@@ -46,7 +46,10 @@ def ended_by(flag: np.ndarray) -> Iterator[None]:
 
 
 def go_on() -> None:
-    """Wait while urgent work runs. Raises Overtaken once the flag is set."""
+    """Wait while more urgent work runs.
+
+    Raises Overtaken once the flag that was given to `ended_by` is set.
+    """
     if _ahead and not is_first():
         _give_way()
     flag = _FLAG.get()

@@ -56,6 +56,9 @@ def read_private(path: Path) -> bytes:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file for this user alone, completely or not at all. Raises OSError."""
+    """Write a file for this user alone, completely or not at all.
+
+    Raises OSError if the file cannot be written.
+    """
     with whole_file(path, FOR_USER) as file:
         file.write(content)

@@ -62,9 +62,10 @@ def take_next(queue: Any) -> Any:
 
 
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
-    """Call the step at an `address`, compiled for several runs at once; return a bit for each.
+    """Call a function at an `address`, compiled for several runs at once; return a bit for each.
 
-    `friso.engine.vector_code` wrote it. A bit is set if the function returned true for that run.
+    `friso.engine.vector_code` compiled it, such as the step. A bit is set if the function returned true for that run.
+    In Python that is not compiled, raises NotImplementedError.
     """
     raise NotImplementedError
 
@@ -337,7 +338,10 @@ class _Frame(ast.NodeVisitor):
         self._loop(node, body, increment, after)
 
     def _loop(self, node: ast.For | ast.While, body: ir.Block, repeat: ir.Block, after: ir.Block) -> None:
-        """Write the body of a loop, with its `break` and `continue`."""
+        """Write the statements of a loop into the block `body`.
+
+        In these, `continue` leads to the block `repeat`, and `break` to the block `after`, in which writing goes on.
+        """
         if node.orelse:
             self.generic_visit(node)
         self._builder.position_at_end(body)
@@ -573,7 +577,10 @@ class _Frame(ast.NodeVisitor):
         return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
-        """Convert a number to a type; whole numbers and truth values may become float64."""
+        """Convert a number to a type, if one is given; whole numbers and truth values may widen.
+
+        A whole number may become float64, and a truth value either. Raises TypeError for anything else.
+        """
         if not isinstance(value, _Value):
             own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):

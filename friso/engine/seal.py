@@ -21,7 +21,10 @@ SECRET, LENGTH = "secret", 32
 
 
 def write_sealed(path: Path, content: bytes) -> None:
-    """Write a file with its authenticator before it, whole or not at all. Raises OSError."""
+    """Write a file with its authenticator before it, whole or not at all.
+
+    Raises OSError if the file cannot be written.
+    """
     write_private(path, _authenticator(path, content) + content)
 
 

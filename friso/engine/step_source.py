@@ -573,6 +573,9 @@ class StepWriter:
 
 
 def _function(name: str, arguments: str, lines: list[str]) -> str:
-    """Return a function for one run, whose column of the buffer is B."""
+    """Return the source of a function for one run, with these argument names and lines.
+
+    Its argument B is the run's column of the buffer.
+    """
     body = "".join(f"    {line}\n" for line in lines)
     return f"def {name}({arguments}):\n{body}"

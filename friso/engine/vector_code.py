@@ -142,7 +142,10 @@ class _Writer:
         return None
 
     def vector(self, value: Any, kind: _Kind) -> _Vector:
-        """Return a value as a vector; a number is copied to the lanes of all runs."""
+        """Return a value as a vector; a number is copied to the lanes of all runs.
+
+        Raises TypeError for a vector of another kind, and for a fraction where a whole number is expected.
+        """
         if isinstance(value, _Vector):
             if value.kind is not kind:
                 raise TypeError(f"{value.kind} where {kind} is expected")

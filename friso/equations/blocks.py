@@ -222,7 +222,8 @@ class Blocks(ABC):
     ) -> Signal:
         """Return a signal behind a second-order transfer function, such as a notch.
 
-        The lowest coefficient of the denominator (`lower`) is 1.
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator; the first of `lower` is
+        1. A drive discretises the function by `rule`; None stands for the drive's own rule.
         """
 
     @abstractmethod
@@ -273,7 +274,8 @@ class Blocks(ABC):
     ) -> Signal:
         """Return a signal behind a first- or second-order transfer function.
 
-        The lowest coefficient of the denominator (`lower`) is 1.
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator; the first of `lower` is
+        1. A drive discretises the function by `rule`; None stands for the drive's own rule.
         """
         if lower[2] != 0:
             return self.biquad(signal, upper, lower, name, rule)
@@ -347,8 +349,9 @@ def unwinding_time() -> sp.Symbol:
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
     """Return the states of integrators in a steady motion in which the controller gives a force.
 
-    This is the force of `STEADY`. The innermost integral, which is made last, supplies it; the others are 0. `force` is
-    the controller's own force in the steady motion, in terms of the integrals.
+    That force is `force` of `STEADY`. The innermost integral, the last of `integrals`, supplies it; the others are 0.
+    The argument `force` is the controller's own force in the steady motion, in terms of the integrals. The result is
+    empty without integrals.
     """
     if not integrals:
         return {}

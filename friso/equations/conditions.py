@@ -43,7 +43,7 @@ def has_conditions(flat: Mapping[str, Any]) -> bool:
 
 
 def load_follows(flat: Mapping[str, Any]) -> bool:
-    """Tell whether the load follows the acceleration of the reference."""
+    """Tell whether friction changes with the acceleration of the reference."""
     return bool(np.any(flat.get(GROWTH, 0.0)))
 
 

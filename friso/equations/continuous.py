@@ -143,14 +143,20 @@ class Continuous(Blocks):
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
-        """Return the low-passed signal, which is a state; `tau` [s]."""
+        """Return the signal behind the low-pass 1/(1 + tau s), tau [s], whose output is a state.
+
+        `rule` has no effect in continuous time.
+        """
         low = state(f"filtered_{name}")
         slope = (signal.value - low) / tau
         self.states.append(State(low, slope, "m", signal.scale, Role.FILTER, signal.settled))
         return replace(signal, value=low, rate=slope)
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """Return the derivative of a signal; its filter, if any, has one state; `tau` [s]."""
+        """Return the derivative of a signal, filtered as s/(1 + tau s) by one state, tau [s].
+
+        Without `tau` it is the signal's own rate. Raises ValueError if that rate is not known.
+        """
         slope = signal.rate if tau is None else self.low_pass(signal, tau, name).rate
         if slope is None:
             raise ValueError(f"the derivative of {name} needs a filter")
@@ -165,9 +171,10 @@ class Continuous(Blocks):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """Return the integral of a signal, which is a state; `gain` in N per unit of the state.
+        """Return the integral of a signal as `gain` times a state.
 
-        It stops at limits as described in the base class.
+        The integrator follows the anti-windup at the force limit, and stops where its own output reaches `limit`. The
+        state leaks at the rate `leak` [1/s], if given. `rule` has no effect in continuous time.
         """
         symbol = state(name)
         output = gain * symbol

@@ -53,7 +53,10 @@ def imposed_form(flat: Mapping[str, Any]) -> Imposed:
 
 
 def imposed(form: Imposed) -> Model:
-    """Return the equations of the law under the imposed motion."""
+    """Return the equations of a friction law under an imposed sinusoidal motion.
+
+    Time counts in periods of the motion.
+    """
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state

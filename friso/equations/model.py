@@ -297,8 +297,9 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
     """Return the length [m] and the rate [1/s] by which a hunting cycle is sized.
 
     The length is the deflection of the loop by the break-away force, or about the motion itself if that is shorter. The
-    rate is the natural frequency of mass and loop. A hunting cycle is a few of each in size and period. Without
-    friction the length is that of the motion, or else the deflection by the forces of [bias].
+    rate is the natural frequency of mass and loop, but at least one over the duration of the motion. A hunting cycle is
+    a few of each in size and period. Without friction the length is that of the motion, or else the deflection by the
+    forces of [bias].
     """
     stiffness = loop_stiffness(structure.controller)
     if breakaway == 0:

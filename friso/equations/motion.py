@@ -162,7 +162,7 @@ def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a stage whose reference stands still from the start.
 
     It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
-    to its end.
+    to its end. A motion whose reference has a single piece is returned unchanged, even if that piece moves.
     """
     rows = motion_of(flat).pieces(flat)
     if len(rows) == 1:

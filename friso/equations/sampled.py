@@ -105,9 +105,9 @@ class DiscreteRate:
 
     @classmethod
     def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> DiscreteRate:
-        """Return the substitute for s by a discretisation rule with a period [s].
+        """Return the substitute for s by a discretisation rule, for a sample time `period` [s].
 
-        A prewarped rule is exact at the angular frequency `exact_at` [rad/s].
+        The rule "prewarped" is exact at the angular frequency `exact_at` [rad/s].
         """
         if rule == "backward_euler":
             return cls(2 * period, sp.S.Zero)
@@ -176,7 +176,10 @@ class Sampled(Blocks):
         return symbol
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
-        """Return the low-passed signal, discretised by the rule; `tau` [s]."""
+        """Return the signal behind the low-pass 1/(1 + tau s), tau [s], computed at every sample.
+
+        The low-pass is discretised by `rule`, or by the drive's own rule if it is None.
+        """
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / tau)
         seen = signal.value + rate.weight * before
@@ -192,9 +195,10 @@ class Sampled(Blocks):
         return "backward_euler" if self.form and self.form.filter_rule == "backward_euler" else "bilinear"
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """Return the derivative of a signal; `tau` [s].
+        """Return the derivative of a signal, filtered as s/(1 + tau s) with tau [s].
 
-        It is low-passed by the drive's rule or, without `tau`, a difference over samples.
+        The filter is discretised by the drive's own rule. Without `tau`, the result is a difference over
+        `velocity_samples`.
         """
         scale = signal.scale / self.period
         if tau is not None:
@@ -214,9 +218,10 @@ class Sampled(Blocks):
         limit: sp.Expr | None = None,
         leak: sp.Expr | None = None,
     ) -> Signal:
-        """Return the integral of a signal, a number that grows at every sample; `gain` [N per unit].
+        """Return the integral of a signal as `gain` times a number that changes at every sample.
 
-        Raises ValueError for an unknown rule.
+        A rule of the drive replaces `rule`. The integrator stops where its output reaches `limit`, and leaks at the
+        rate `leak` [1/s], if given. Raises ValueError for an unknown `rule`.
         """
         if rule not in get_args(IntegralRule):
             raise ValueError(f"rule: {rule!r}; expected one of {', '.join(get_args(IntegralRule))}")
@@ -235,7 +240,11 @@ class Sampled(Blocks):
     def biquad(
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
-        """Return a signal behind a second-order filter, discretised by the rule."""
+        """Return a signal behind a second-order transfer function, computed at every sample.
+
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator. They are discretised by
+        `rule`, or by the drive's own rule if it is None.
+        """
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
         (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))
         lag = (upper[1] - upper[0] * lower[1]) * rate.scale(self.period)

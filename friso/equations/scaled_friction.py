@@ -24,14 +24,17 @@ def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
 
 
 def least_static_factor(flat: Mapping[str, Any]) -> float:
-    """Return the smallest factor on static friction for which it is at least Coulomb friction."""
+    """Return the smallest factor on static friction for which it is at least Coulomb friction.
+
+    The stages, given by keys in SI, must have a law with both.
+    """
     return max(float(np.max(flat[coulomb] / flat[static])) for static, coulomb in static_frictions(flat).items())
 
 
 def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     """Return stages with static friction times a factor, Coulomb friction unchanged.
 
-    `flat` has the stages' keys in SI.
+    `flat` has the stages' keys in SI. A law that does not have both stays as it is.
     """
     return {**flat, **{key: flat[key] * factor for key in static_frictions(flat)}}
 

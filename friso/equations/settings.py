@@ -78,7 +78,7 @@ class Setting:
 def gain_states(flat: FlatMachine) -> list[FlatMachine]:
     """Return a stage's keys once for each set of gains that its loop may have.
 
-    There is one set outside the standstill window, and one within it.
+    With a standstill factor there are two sets: one outside the standstill window, and one within it.
     """
     factor, controller = flat.get(ControllerSection.key("standstill_factor")), controller_of(flat)
     if factor is None:

@@ -93,7 +93,7 @@ class Structure:
     - `masses` are the names of the masses given, for a rigid stage.
     - `biased` are the names of the masses on which a constant force acts.
     - `friction_variant` is any further choice of the friction law, such as a Stribeck exponent that is a whole number.
-    - `load_follows`: friction grows with the acceleration of the reference.
+    - `load_follows`: friction changes with the acceleration of the reference.
     - `reference` describes the pieces of the reference.
     - `limiter_pulls`: a touched limiter may pull by its damping.
     """

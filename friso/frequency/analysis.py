@@ -61,7 +61,11 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
 
 
 def _checked(flat: Mapping[str, Any], member: Members) -> Members:
-    """Return a single state, if the stage can be in it. Raises InputError."""
+    """Return a state of a stage unchanged, after checking that the stage can be in it.
+
+    Raises InputError for several states at once, a limiter that cannot be so, or a bias force that breaks the cart
+    away.
+    """
     if len(member) != 1:
         raise InputError(
             "case", f"{len(member)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))"

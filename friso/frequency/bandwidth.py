@@ -54,9 +54,9 @@ def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.nda
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
     """Return the bandwidths [Hz] of a stage with changed keys, in continuous time, (count,).
 
-    `changes` has the keys with their values [SI], arrays (count,). The results have a relative error of 1e-3: the loop
-    is computed on a grid of frequencies, and its gain is a power of frequency in between. If the gains at standstill
-    differ, the larger bandwidth counts.
+    `changes` has the keys with their values [SI], arrays (count,). The stage slides; a loop that never falls through
+    gain 1 gives NaN. The results have a relative error of 1e-3: the loop is computed on a grid of frequencies, and its
+    gain is a power of frequency in between. If the gains at standstill differ, the larger bandwidth counts.
     """
     flat, sliding = stage.flat(), _sliding(stage.flat())
     omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])

@@ -63,7 +63,10 @@ class DriveTiming:
 
     @property
     def highest(self) -> float:
-        """Return half the sampling frequency [rad/s], the highest that the drive can represent."""
+        """Return half the sampling frequency [rad/s], the highest that the drive can represent.
+
+        It is infinite for a controller in continuous time.
+        """
         return np.pi / self.sample_time if self.sample_time else np.inf
 
     @property
@@ -135,10 +138,10 @@ def waited(machine: System, samples: int) -> System:
 
 
 def delayed(machine: System, delay: float, loop: float) -> System:
-    """Return a plant with one input behind a delay [s], as a row of rational functions (Pade).
+    """Return a plant with one input behind a delay [s], made of rational functions (Pade).
 
-    `loop` [rad/s] is the fastest resonance of the closed loop without delay. Raises InputError if the phase of the
-    plant's own resonances turns too far within the delay.
+    Several of them follow one another. `loop` [rad/s] is the fastest resonance of the closed loop without delay. Raises
+    InputError if the phase of the plant's own resonances turns too far within the delay.
     """
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay

@@ -149,7 +149,8 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 def about_resonances(system: Poles) -> np.ndarray:
     """Return angular frequencies [rad/s] about each state's lightly damped closed-loop poles.
 
-    The shape is (members, k), with NaN for states that have fewer.
+    The shape is (members, k), with NaN for states that have fewer. With loops at several rates all are NaN, because the
+    poles do not show which alias resonates.
     """
     settings = FrequencySettings.current()
     if system.drive.period > 1:  # its poles do not show which alias resonates

@@ -182,7 +182,11 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
-    """Return the gain factors that take the loop through -1: where L is real and negative."""
+    """Return the gain factors that take the loop L through -1: where L is real and negative.
+
+    `gains` are the values of L at the frequencies `omega` [rad/s]. `ends` are further real values, at rest and at half
+    the sampling frequency. The result is empty if L is nowhere real and negative.
+    """
     settings = FrequencySettings.current()
     # leave out rounding
     clear = np.where(np.abs(gains.imag) > settings.real_share * np.abs(gains.real), gains.imag, np.nan)

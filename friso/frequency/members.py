@@ -121,7 +121,8 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     """Return states near and between all limit cases of a stage, stuck and sliding.
 
     Stuck ones bear `biases` different bias forces up to nearly break-away, for and against the motion. Sliding ones
-    cover all speeds by `speeds_` of them, in both directions if friction differs between them.
+    cover all speeds by `speeds_` of them, in both directions if friction differs between them. Without friction they
+    are the limit cases alone.
     """
     settings = FrequencySettings.current()
     flat = leading_friction(flat)

@@ -17,7 +17,7 @@ def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]
     """Return the steady values of a stage's friction law in each state of `members`, by name.
 
     Each has the shape (members,). They are the values of its internal states, of its modes with memory, of the sides of
-    its kinks (where derivatives jump), and of its direction.
+    its kinks (where derivatives jump), and of its direction. The result is empty without friction.
     """
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:

@@ -180,7 +180,7 @@ def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifte
 
 
 def unseen(control: System, measured: str) -> System:
-    """Return the controller without the input `measured`, which no longer has an effect."""
+    """Return the controller with all effects of its input `measured` set to 0; the input stays."""
     column = control.inputs.index(measured)
     b, d = control.b.copy(), control.d.copy()
     b[..., column] = d[..., column] = 0.0

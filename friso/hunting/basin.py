@@ -160,10 +160,10 @@ def _last_swing(
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages to the time `end` [s]; measure peak to peak over `last` [s] before it.
+    """Run stages to the time `end` [s]; measure peak to peak over at least `last` [s] before it.
 
-    Both times have the shape (count,). Returns the swing [m], which runs were completed, and the final states, (count,
-    kept). `starts` are initial states (None: those of the motion).
+    Both times have the shape (count,). Returns the swing [m], which runs were completed, and the final states with
+    modes that have a memory, (count, kept). `starts` are initial states (None: those of the motion).
     """
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - last / end))

@@ -178,7 +178,10 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
 
 
 def _share(stage: Stage) -> float:
-    """Return the fraction of a check's work for this case: one with a free joint, or another."""
+    """Return the fraction of a check's work that a variant of the stage may take.
+
+    It depends on whether the variant has a free joint.
+    """
     settings = CheckSettings.current()
     free = stage.joint is not None and not stage.joint.locked
     return settings.free_work_share if free else 1 - settings.free_work_share

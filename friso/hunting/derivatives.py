@@ -18,10 +18,11 @@ from friso.hunting.settings import EdgeSettings
 
 @dataclass(frozen=True)
 class CycleDerivatives:
-    """The limit cycle of a stage and its derivatives by keys [SI], each of shape (keys,).
+    """The limit cycle of a stage, with derivatives of its amplitude and period by keys.
 
     It is the symmetric cycle, or for a stage that is not symmetric the cycle over a whole period. `attracts` is true if
-    it is stable; `amplitude` [m] and `period` [s] are its size.
+    it is stable; `amplitude` [m] and `period` [s] are its size. `amplitude_by` and `period_by`, shape (keys,), are
+    derivatives by the keys' SI values.
     """
 
     attracts: bool
@@ -93,7 +94,7 @@ def _extremes(
     """Return half of peak to peak of the position on an orbit, and its derivatives by the keys.
 
     `moved` (states, keys) are the derivatives of the orbit's state by the keys. Returns None if a run was not
-    completed.
+    completed, or turned less than twice.
     """
     whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
     results = stages.run(orbits.states, whole, rtol, least_swing=0.0)
@@ -117,7 +118,8 @@ def edge_derivatives(flat: Mapping[str, Any], keys: tuple[str, ...], factor: flo
 
     The result is the relative change of the edge per relative change of the key. The edge lies at `factor` times the
     bandwidth of the stage, everything else unchanged. Along the edge the multiplier keeps its value; its derivatives
-    are central differences. Returns None if no cycle flips there.
+    are central differences. Returns None if no cycle flips there, if a limiter may chatter, or if an orbit could not be
+    closed.
     """
     settings = EdgeSettings.current()
     inside = faster(flat, factor * (1 - settings.inside_edge_share))

@@ -59,8 +59,9 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Judge the stability of sliding stages at their own and all lower gains, shape (count,).
 
     Each gets a `LowerGains`. A loop is "unstable" if it is so at one of the gains, with the viscous friction of the
-    direction that has less. The result is "unknown" if the controller does not name the keys of its gain. It is so too
-    if the controller acts differently near the reference and far from it, which the linear loop at rest does not show.
+    direction that has less. The result is "unknown" if the controller does not name the keys of its gain. It is also
+    "unknown" if the controller acts differently near the reference and far from it, which the linear loop at rest does
+    not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup, only the force limit and
     the viscous friction matter for the largest motions: with a mass m and viscous friction b, they shrink if b k_p > m
@@ -266,7 +267,10 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,)."""
+    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,).
+
+    `output` names the friction force among the model's outputs.
+    """
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
@@ -292,7 +296,10 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
 
 
 def _force(stages: Ensemble, states: np.ndarray, output: str) -> np.ndarray:
-    """Return a force [N] among the outputs, shape (count,)."""
+    """Return the force [N] that is the model's `output` of this name, shape (count,).
+
+    Stages are in `states`, shape (count, states).
+    """
     kernel = stages.kernel
     modes = kernel.modes(states.T, 0.0, np.zeros(3), stages.values)
     rows = kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), stages.values)

@@ -125,7 +125,10 @@ class _Grid:
     """
 
     def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
-        """Survey the stage at the bandwidth factors numbered `first` and higher. Raises Exhausted."""
+        """Survey the stage at the bandwidth factors numbered `first` and higher.
+
+        `flat` has the stage's keys in SI. Raises Exhausted if an allowance of work is used up.
+        """
         self.flat, self.factors, self.lowest = flat, factors, first
         self.attracts, self.decided, self.passed = (np.zeros(len(factors), bool) for _ in range(3))
         self.motions: list[list[Swinging]] = [[] for _ in factors]
@@ -145,7 +148,8 @@ class _Grid:
     def _survey(self, numbers: np.ndarray) -> None:
         """Sketch the stages at factors given by number; simulate those that the sketch leaves open.
 
-        Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted.
+        Factors nearest to 1 come first, until a fraction of the work is used up. Raises Exhausted if the allowance
+        around the whole search is used up.
         """
         settings = EdgeSettings.current()
         sketch = sketched(self._stages(numbers))
@@ -230,7 +234,7 @@ class _Grid:
         """Follow attraction from the bandwidth factor numbered `at` to its end.
 
         It is followed up (`ahead` 1) or down (-1). Returns None if attraction reaches the end of the search, or if
-        closer inspection shows no attractor. Raises Exhausted.
+        closer inspection shows no attractor. Raises Exhausted if an allowance of work is used up.
         """
         if not self.proved(at, ahead):
             return None
@@ -280,7 +284,7 @@ class _Grid:
         return bool(self.attracts[at])
 
     def _inspect(self, numbers: np.ndarray) -> None:
-        """Close orbits at the factors with these numbers."""
+        """Close orbits at the factors with these numbers, and record what attracts the stage there."""
         survey = what_attracts(self._stages(numbers))
         self.attracts[numbers] = survey.attracts | self.passed[numbers]
         self.decided[numbers] = survey.decided

@@ -62,6 +62,8 @@ class Measures:
     - `largest_force` [N]: of the actuator.
     - `status`, `steps` attempted and `rejected`: of the solver.
     - `turns`: which turning points are counted peaks, shape (runs, room).
+
+    A run that was not completed has no peaks, and NaN for the other numbers on its motion.
     """
 
     peaks: np.ndarray
@@ -96,7 +98,11 @@ def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarra
 
 
 def corner_of(flat: Mapping[str, Any]) -> np.ndarray | float:
-    """Return the time [s] of the references' last corner; 0 if they move throughout."""
+    """Return the time [s] of the references' last corner, from which they stand or move evenly.
+
+    The result is 0 if a reference neither stands nor moves at constant velocity in the end. `flat` has the stages' keys
+    in SI.
+    """
     return np.asarray(last_corner(flat)) if ends_evenly(flat) else 0.0
 
 

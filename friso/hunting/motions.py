@@ -89,9 +89,9 @@ class FollowedMotions:
         return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Continue the motions numbered `which` for long, and enter the results. Raises Exhausted.
+        """Continue the motions numbered `which` for long, and enter the results.
 
-        `flat` has the keys of their `count` stages in SI.
+        `flat` has the keys of their `count` stages in SI. Raises Exhausted if an allowance of work is used up.
         """
         settings = CheckSettings.current()
         stages = Ensemble.held(flat, count, form=shared_structure(flat))

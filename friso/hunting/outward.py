@@ -1,8 +1,8 @@
 """Find the edge of hunting in bandwidth: the factor beyond which the stage has no attractor.
 
-A closed orbit is followed through the bandwidth to its end: a flip, a fold, or the loss of the orbit. If another
-attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be followed,
-surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
+A closed orbit is followed through the bandwidth to its end: a flip, a fold, a torus, or the loss of the orbit. If
+another attractor exists just beyond, its orbit is followed in turn, until there is none. Where no orbit can be
+followed, surveys narrow down the edge between the last bandwidth with an attractor and the first one without.
 """
 
 from __future__ import annotations
@@ -110,7 +110,10 @@ class EdgeSearch:
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
-        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way."""
+        """Follow orbits from a bandwidth to the edge of hunting, updating `place` on the way.
+
+        Raises Beyond if an attractor exists up to the end of the search.
+        """
         for _ in range(EdgeSettings.current().most_orbits_followed):
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
@@ -162,7 +165,7 @@ class EdgeSearch:
         """Narrow down the edge by surveys where no orbit can be followed to it.
 
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
-        them until they are close together.
+        them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
         """
         settings = EdgeSettings.current()
         reach, ahead = settings.reach_log, self._ahead(place.at)
@@ -207,7 +210,7 @@ class EdgeSearch:
         return Ensemble.held(faster(self.flat, factors), len(factors))
 
     def _ahead(self, at: float) -> float:
-        """Return the direction of the search from a factor: 1 up, -1 down."""
+        """Return the direction of the search from the bandwidth factor `at`: 1 up, -1 down."""
         return 1.0 if self.farthest >= at else -1.0
 
     def _still_ahead(self, at: float, outside: float) -> float:

@@ -105,7 +105,11 @@ class _Side:
     """
 
     def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
-        """Survey some factors roughly. Raises Exhausted."""
+        """Survey some factors roughly, from 1 to the `farthest`.
+
+        `scaled` makes the stages, and `attracts` is true if the stage itself hunts. Raises Exhausted if an allowance of
+        work is used up.
+        """
         self.scaled, self.attracts = scaled, attracts
         self.factors, self.changed = np.ones(1), np.zeros(1, bool)
         self.decided, self.searched, self.certain = (np.ones(1, bool) for _ in range(3))
@@ -114,7 +118,8 @@ class _Side:
     def end(self) -> MarginEnd | None:
         """Find the first factor at which hunting begins or ends; None if there is none.
 
-        Raises Exhausted, and Undecided.
+        Raises Exhausted if an allowance of work is used up, and Undecided if surveys leave open whether hunting
+        changes.
         """
         for _ in range(EdgeSettings.current().most_proofs):
             first = self._bracketed()

@@ -37,8 +37,8 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
 def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMargin]:
     """Find what change in stroke and stiffness of a free joint starts or ends hunting.
 
-    The range is given by `SEARCH_LIMITS`. The margins are listed by key. There is none for a stage that cannot hunt, or
-    whose attractors are unknown.
+    The range is given by `SEARCH_LIMITS`. The margins are listed by key. There is none without a free joint, for a
+    stage that cannot hunt, or for one whose attractors are unknown.
     """
     flat = stage.flat()
     if stage.joint is None or stage.joint.locked or not _is_known(judgement):
@@ -71,8 +71,9 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
     """Tell whether a stage with a controller faster by `factor` stays quiet at other friction.
 
-    Static friction is multiplied and divided by the factor by which advice keeps away from an edge. Returns None if
-    this takes more than the given work, or is not certain.
+    Static friction is multiplied and divided by the factor by which advice keeps away from an edge; it stays at least
+    Coulomb friction. Returns None for a law that lacks one of both. Returns None as well if this takes more than the
+    given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

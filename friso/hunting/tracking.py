@@ -162,7 +162,7 @@ def _reversals(
 ) -> tuple[Reversal, ...]:
     """Return the reversals of a reference in a span of time [s], each with the error after it.
 
-    `error` [m] belongs to the times `time` [s], both of shape (n,).
+    `error` [m] belongs to the times `time` [s], both of shape (n,). There are none for a reference without sinusoids.
     """
     corners = motion.pieces(flat, 1)[0, 1:, 0] if motion.form_of(flat).tones else np.zeros(0)
     reversals = []

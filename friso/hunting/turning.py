@@ -76,7 +76,7 @@ def zigzag(values, count, least, kinds):
 def keep_tallest(times, values, count, kinds, peaks):
     """Mark counted peaks: late and tall maxima, of which the tallest within `SEPARATION` counts.
 
-    Maxima are marked in `kinds`, which is used up. MATLAB's findpeaks does so with MinPeakDistance.
+    Maxima are marked in `kinds`, which is overwritten. MATLAB's findpeaks does so with MinPeakDistance.
     """
     for k in range(count):
         if times[k] < COUNTED_AFTER or values[k] <= COUNTED_ABOVE:
@@ -97,8 +97,9 @@ def keep_tallest(times, values, count, kinds, peaks):
 def mean_period(times, count, kinds, ended):
     """Return the mean time [s] between maxima in the last quarter, or else between minima.
 
-    The zigzag alternates between maxima and minima. A slower swing gives the time between the last two extrema of a
-    kind in the last half. The result is NaN if there are no two of a kind.
+    The zigzag alternates between maxima and minima; its last extremum is left out, because that swing is not over yet.
+    A slower swing gives the time between the last two extrema of a kind in the last half. The result is NaN if there
+    are no two of a kind.
     """
     last = -1  # the last swing is not over yet
     for k in range(count):

@@ -315,7 +315,10 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
 
 
 def _runs_away(stage: Stage, target: Target) -> bool:
-    """Tell whether the stage's own motion diverges before it has come to the attractor."""
+    """Tell whether the stage's own motion diverges before a run would count as hunting.
+
+    `target` has that time, from the last corner of the reference.
+    """
     flat = stage.flat()
     longer = {**flat, "motion.duration": float(np.max(last_corner(flat)) + target.lasting)}
     return bool(run_motions(longer, 1, measuring_options(RTOL)).away[0])
@@ -331,7 +334,9 @@ def _starts(
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[CheckPart, ...]]:
     """Find the kicks and moves that start hunting, within an amount of work.
 
-    Returns the displacements, the pushes and the moves, and the part of the check that ran out of work, if any.
+    Returns the displacements, the pushes and the moves. All are None if the attractor may be a passing swing, or if the
+    work does not suffice. The second result names this part of the check if its answer is incomplete: for lack of work,
+    or because runs failed.
     """
     settings = CheckSettings.current()
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)

@@ -251,6 +251,8 @@ def has_a_map(stages: Ensemble) -> bool:
     - A force limit without anti-windup lets swings grow.
     - Integrals of several loops wind up separately.
     - The stage may stand anywhere within a dead band or a backlash.
+
+    The result is also false within a block of `search_alone`.
     """
     if _SEARCHES_ALONE.get():
         return False

@@ -39,7 +39,8 @@ MOST = 100
 class Correlations:
     """Keys of a stage file and their correlation matrix, shape (keys, keys).
 
-    An empty object stands for independent keys. Raises StageError if the matrix is no correlation matrix.
+    An empty object stands for independent keys. Raises StageError if the matrix is no correlation matrix of the keys,
+    or if a key is there twice.
     """
 
     keys: tuple[str, ...] = ()
@@ -60,7 +61,7 @@ class Correlations:
     def over(self, keys: list[str]) -> np.ndarray:
         """Return the correlation matrix of all `keys`, shape (keys, keys).
 
-        Keys without a correlation here are independent.
+        They must include the keys of this object; the others are independent.
         """
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]
@@ -91,7 +92,7 @@ def correlations_file(path: str | os.PathLike[str]) -> Path:
 def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlations:
     """Return the correlations of a file, which must be of uncertain keys of the stage.
 
-    Raises StageError.
+    Raises InputError if they are of other keys, and for a file that has no correlation matrix.
     """
     try:
         correlations = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
@@ -104,7 +105,7 @@ def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlation
 def correlations_text(correlations: Correlations, stage: Stage) -> str:
     """Return the text of a file of correlations of uncertain keys of the stage.
 
-    Raises StageError if they are of other keys.
+    Raises InputError if they are of other keys.
     """
     _belongs(correlations, stage)
     rows = [f"  [{', '.join(repr(float(value)) for value in row)}]," for row in correlations.matrix]
@@ -131,7 +132,7 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
-    """Check that all keys are uncertain keys of the stage. Raises StageError otherwise."""
+    """Check that all keys are uncertain keys of the stage. Raises InputError otherwise."""
     keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:

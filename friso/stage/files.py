@@ -53,14 +53,18 @@ def load(path: str | os.PathLike[str]) -> Stage:
 
 
 def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the tables of a stage file, which need not make a whole stage. Raises StageError."""
+    """Read the tables of a stage file, which need not make a whole stage.
+
+    Raises StageError for a file that cannot be read, or that is not TOML.
+    """
     return _hinted(path, lambda text: _with_whole_paths(parsed(text, _EXPECTED), Path(path).parent))
 
 
 def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
-    """Read a stage file by the function `read`.
+    """Read the text of a stage file, and return what the function `read` makes of it.
 
-    For another kind of file, the error names the command that reads it. Raises StageError.
+    Raises StageError for a file that cannot be read or does not pass. For another kind of file, the error names the
+    command that reads it.
     """
     try:
         return read(text_of(Path(path), _EXPECTED))
@@ -76,7 +80,7 @@ def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
 def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
     """Return the stage of a file with dotted keys set, also if the file lacks them.
 
-    Raises StageError.
+    Raises StageError if the file cannot be read, or if the changed tables make no valid stage.
     """
     try:
         return changed(_with_whole_paths(parsed(text_of(path, _EXPECTED), _EXPECTED), path.parent), changes)
@@ -101,7 +105,7 @@ def loads(text: str, origin: str = "stage file") -> Stage:
 def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
     """Return the stage of a TOML text; files that it names stand in `folder`.
 
-    `origin` names the text in errors. Raises StageError.
+    `origin` names the text in errors. Raises StageError if the text is not TOML, or makes no valid stage.
     """
     try:
         tables = parsed(text, _EXPECTED)
@@ -158,7 +162,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 def parse_set(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE of a command line; a value that is no TOML is a text.
 
-    Raises InputError.
+    Raises InputError if there is no key or no equals sign, or if a quote is not closed.
     """
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
@@ -227,7 +231,8 @@ def _reason(error: OSError | ValueError) -> str:
 def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     """Return the tables of a TOML text.
 
-    `expected` says in errors what the text should be. Raises InputError.
+    `expected` says in errors what the text should be, and `example` shows it. Raises InputError for an empty text, for
+    anything but TOML, and for too many lines or tables.
     """
     if not text.strip():
         raise InputError("", "an empty file", expected, example)

@@ -31,7 +31,10 @@ Polynomial = tuple[Any, Any, Any]
 
 
 class Transfer(NamedTuple):
-    """A transfer function; the lowest coefficient of its denominator (`lower`) is 1."""
+    """A transfer function: coefficients of 1, s and s^2 of its numerator and denominator.
+
+    The numerator is `upper`, the denominator `lower`, whose first coefficient is 1.
+    """
 
     upper: Polynomial
     lower: Polynomial

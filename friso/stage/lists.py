@@ -118,7 +118,11 @@ class Coefficients:
         return f"[{', '.join(as_toml(example) for example in self.examples)}]"
 
     def read(self, raw: Any) -> Values:
-        """Return the values of an array. Raises InputError."""
+        """Return the values of an array of numbers; complex numbers stay texts.
+
+        Raises InputError for anything but an array, or under the number of an element that is no finite number. Only
+        `roots` may be written as texts.
+        """
         if not isinstance(raw, list | tuple):
             raise InputError("", quoted(raw), self.expected, self.written_example)
         for number, item in enumerate(raw, start=1):

@@ -114,7 +114,10 @@ def implausible_values(stage: Stage) -> Iterator[str]:
 
 
 def _other_units(stage: Stage, key: str) -> Iterator[tuple[str, float]]:
-    """Yield the units in which a mass may have been meant, with factors that convert its value."""
+    """Yield the units in which a mass may have been meant, with factors that convert its value.
+
+    There are none on a rotary axis, and none for a value without a unit of mass.
+    """
     written = _written(stage, key)
     unit = written.partition(" ")[2].strip()
     if stage.axis_kind == ROTARY or unit not in _MASS.units:
@@ -192,7 +195,7 @@ def _written(stage: Stage, key: str) -> str:
 def _question(written: str, usual: _Usual) -> str:
     """Ask whether another unit was meant, with which the number as written would be usual.
 
-    The result is "" if there is no such unit.
+    The result is "" if there is no such unit, or if an interval was written.
     """
     number, _, unit = written.partition(" ")
     for other in usual.units:

@@ -38,9 +38,10 @@ class PlugIn:
         return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
 
     def load(self) -> None:
-        """Import the module by its name if that leads to its file, else from the file.
+        """Import the module, unless that has been done; a script is always run again.
 
-        Raises ImportError.
+        It is imported by its name if that leads to its file, else from the file. Raises ImportError if there is no
+        file.
         """
         if self.module in sys.modules and self.module != SCRIPT:
             return

@@ -257,7 +257,10 @@ class Density(Quantity):
         return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
 
     def read(self, entry: Any) -> Value:
-        """Return the SI value of a text (or of the text of a Value). Raises StageError."""
+        """Return the SI value of a text (or of the text of a Value), which must end with /Hz^0.5.
+
+        Raises StageError for any other text, or an amplitude that the key does not accept.
+        """
         text = getattr(entry, "text", entry)
         amplitude = _PER_ROOT_HERTZ.sub("", text) if isinstance(text, str) else text
         if amplitude == text and isinstance(text, str):

@@ -147,7 +147,10 @@ class UncertainSection(Section):
 
 
 def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
-    """Read an element of an array, which may be uncertain, "20 N +/- 1 N". Raises InputError."""
+    """Read an element of an array, which may be uncertain, "20 N +/- 1 N".
+
+    `field` declares what an element may be. Raises InputError for anything else.
+    """
     text = getattr(value, "text", value)
     return uncertain_value(text, field) if is_range(text) else field.read(value)
 
@@ -163,7 +166,10 @@ class Table:
     example: str
 
     def read(self, entry: Any, info: ValidationInfo) -> Any:
-        """Make the section from a table; a section is left as it is. Raises InputError."""
+        """Make the section from a table; a section is left as it is.
+
+        Raises InputError for anything but a table, and for a table with wrong keys or values.
+        """
         if isinstance(entry, Section):
             return entry
         if not isinstance(entry, dict):

@@ -187,9 +187,10 @@ class Stage(Section):
         return self
 
     def _has_a_whole_transmission(self) -> None:
-        """Check that encoders and motor friction come with a transmission.
+        """Check that transmission and [encoder] are both there or both missing.
 
-        A transmission has encoders on one side or both.
+        Motor friction needs a transmission. The motor's travel per turn must be a lead on a linear axis, and a ratio on
+        a rotary one. Raises StageError otherwise.
         """
         if self.transmission is None:
             for table, words in (("encoder", "a choice of encoders"), ("motor_friction", "friction at the motor")):
@@ -206,7 +207,10 @@ class Stage(Section):
             raise StageError(f"transmission.{name}", actual, "what one turn of the motor does there", other)
 
     def _has_one_stiffness(self) -> None:
-        """Check that a joint has a stiffness, or leaf springs from which it follows."""
+        """Check that a joint has a stiffness, or leaf springs from which it follows, but not both.
+
+        A locked joint needs neither. Leaf springs also replace [parasitic]. Raises StageError otherwise.
+        """
         joint = self.joint
         if joint and self.flexure:
             keys = ["joint.stiffness"] if joint.stiffness is not None else ["[parasitic]"] if self.parasitic else []
@@ -218,7 +222,10 @@ class Stage(Section):
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
 
     def _has_computable_leaves(self) -> None:
-        """Check that stiffness and modes can be computed for the sizes of the leaf springs."""
+        """Check that stiffness and modes can be computed for the sizes of the leaf springs.
+
+        Raises StageError otherwise.
+        """
         try:
             flat = self.flat() if self.flexure else {}
         except InputError:  # leaves that buckle, for one: it says why
@@ -322,7 +329,7 @@ class Stage(Section):
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """Return the stage with some keys set to SI numbers, and `without` some tables.
 
-        Numbers are written so that they read back unchanged. Raises StageError.
+        Numbers are written so that they read back unchanged. Raises StageError if the result is no valid stage.
         """
         keys = numeric_keys({**self.flat(), **numbers})
         texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
@@ -354,7 +361,8 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
     """Return a new stage from tables in which some keys are set, or removed by None.
 
     A controller that is given in another way, by its gains where the tables have a crossover, replaces the controller
-    of the tables. The tables passed in stay as they are. Raises StageError.
+    of the tables. The tables passed in stay as they are. Raises StageError for a key that cannot be set or removed, and
+    if the result is no valid stage.
     """
     own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
@@ -578,7 +586,8 @@ def _under(tables: Mapping[str, Any], key: str) -> Any:
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
     """Set a key such as "friction.static" in nested tables, or an element of an array.
 
-    None removes the key. Raises StageError.
+    None removes the key; it removes no single element of an array. Raises StageError for a key below a value that is no
+    table, and for an element that an array does not have. It is also raised for a key to be removed that is not there.
     """
     *path, last = key.split(".")
     place: Any = tables

@@ -68,9 +68,9 @@ class Encoder(UncertainSection):
 
 
 def motor_mass(flat: Mapping[str, Any]) -> Any:
-    """Return the motor's mass at the load [kg], from its inertia; None without an inertia.
+    """Return the motor's mass at the load [kg], from its inertia and its travel per turn.
 
-    `flat` has the stage's keys in SI.
+    The result is None if either is missing. `flat` has the stage's keys in SI.
     """
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2

@@ -236,6 +236,6 @@ def read_axes(
     """Return all axes of a study from texts, lists or arrays with a unit, by name.
 
     Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. With `log`, ranges
-    are logarithmic unless they state their spacing. Raises InputError.
+    are logarithmic unless they state their spacing. Raises InputError for a name or values that the stage cannot have.
     """
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

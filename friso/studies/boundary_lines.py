@@ -28,9 +28,9 @@ UNKNOWN marks stages whose simulations failed or did not settle; INVALID marks s
 class Line:
     """A branch of cycles over one key, or a curve in two keys: its n points in order.
 
-    `at` [SI], shape (n, keys), has the values of the keys. `error` is their error, NaN except at special points (flips
-    and folds). `kinds` has the kind of each special point, "" for an ordinary one. `amplitude` [m], `period` [s] and
-    `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line ends on either side.
+    `at` [SI], shape (n, keys), has the values of the keys. `error` is their error, NaN except at special points (flips,
+    folds and tori). `kinds` has the kind of each special point, "" for an ordinary one. `amplitude` [m], `period` [s]
+    and `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line ends on either side.
     """
 
     shape: CycleShape
@@ -44,7 +44,7 @@ class Line:
 
     @property
     def special(self) -> np.ndarray:
-        """Return the indices of the special points (flips and folds)."""
+        """Return the indices of the special points (flips, folds and tori)."""
         return np.flatnonzero([bool(kind) for kind in self.kinds])
 
     @property
@@ -146,7 +146,10 @@ def place_verdicts(result: Diagram) -> list[str]:
 
 
 def end_verdicts(result: Diagram) -> tuple[str, str]:
-    """Return the verdicts at the lower and the upper end of the range of a diagram."""
+    """Return the verdicts at the lower and the upper end of the range of a diagram.
+
+    An end at which no stage was simulated counts as invalid.
+    """
     verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
     return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
 
@@ -166,8 +169,8 @@ class StabilityChange(NamedTuple):
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return the changes at which hunting begins and ends over the range, in order.
 
-    Verdicts within the error of a special point (flip or fold) do not locate a change. Unstable cycles are so weak
-    there that runs may stay on them. But such verdicts do show hunting between stages that do not hunt.
+    Verdicts within the error of a special point (flip, fold or torus) do not locate a change. Unstable cycles are so
+    weak there that runs may stay on them. But such verdicts do show hunting between stages that do not hunt.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
@@ -205,7 +208,7 @@ def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
 def begins_at(line: Line, k: int) -> bool | None:
     """Tell whether a cycle gains stability at point `k` of a line as the key rises.
 
-    The point is a special one (flip or fold). None if the cycle is stable on both sides of it, or on neither.
+    The point is a special one (flip, fold or torus). None if the cycle is stable on both sides of it, or on neither.
     """
     beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
     if beside[0] == beside[1]:

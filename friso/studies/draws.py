@@ -47,8 +47,8 @@ class Fates:
         """Return how well each key separates hunting stages from others, the most decisive first.
 
         The measure is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 if all hunting stages have
-        the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. The result is empty if all
-        stages hunt, or none.
+        the larger values, -1 if they have the smaller ones, 0 if the key separates nothing. Stages without a certain
+        verdict are left out. The result is empty if all of the others hunt, or none of them.
         """
         from scipy.stats import mannwhitneyu  # 0.7 s to import
 
@@ -68,7 +68,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     """Judge the drawn stages in each variant: as in the file and, with a joint, locked and free.
 
     The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then,
-    without amplitudes and periods of hunting.
+    without amplitudes and periods of hunting. Raises KeyboardInterrupt if there are none yet.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -97,8 +97,8 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 class DrawnEdges:
     """Edges of hunting of drawn stages: the bandwidths [Hz] below which they hunt, (count,).
 
-    Each edge lies between `low` and `high`. Both are NaN for a stage whose hunting does not begin or end within the
-    tried bandwidths.
+    Each edge lies between `low` and `high`. Both are NaN for a stage that hunts at none of the tried bandwidths, or up
+    to the last. They are NaN as well if one of the answers is not certain.
     """
 
     low: np.ndarray

@@ -29,18 +29,24 @@ class Ledger:
         return self._file(number).exists()
 
     def entered(self) -> list[str]:
-        """Return the numbers of the recorded blocks, as texts, sorted. Raises OSError."""
+        """Return the numbers of the recorded blocks, as texts, sorted.
+
+        Raises OSError if the folder of records cannot be read.
+        """
         return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
 
     def enter(self, number: str) -> None:
-        """Record a block after its chunks were written. Raises OSError."""
+        """Record a block after its chunks were written.
+
+        Raises OSError if the record cannot be written.
+        """
         self._file(number).parent.mkdir(exist_ok=True)
         put(self._file(number), self._entry(number))
 
     def is_whole(self, number: str) -> bool:
-        """Tell whether all chunks of a block are unchanged since the block was recorded.
+        """Tell whether a block is recorded, and all of its chunks are unchanged since then.
 
-        Raises PermissionError if they cannot be read.
+        Raises PermissionError if the record or a chunk cannot be read.
         """
         try:
             return stored(self._file(number)) == self._entry(number)
@@ -52,7 +58,8 @@ class Ledger:
     def digest(self, number: str, name: str) -> str | None:
         """Return the recorded digest of a metric's chunk in a block.
 
-        It is None if the block was not recorded, and "" if the record is damaged. Raises PermissionError.
+        It is None if the block was not recorded, and "" if the record is damaged or of another study. Raises
+        PermissionError if the record cannot be read.
         """
         try:
             entry = json.loads(stored(self._file(number)))

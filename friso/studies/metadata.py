@@ -82,7 +82,10 @@ class Metadata:
         return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
-        """Rewrite the metadata files of the store at `path` that differ. Raises OSError."""
+        """Rewrite the metadata files of the store at `path` that differ from these metadata.
+
+        Raises OSError if a file cannot be written.
+        """
         for name in self.damaged_files(path):
             if name == _FILE:
                 logger.warning("%s: %s was damaged, and is written anew from its copy", path, name)
@@ -93,7 +96,7 @@ class Metadata:
 def seal_metadata(path: Path, axes: Iterable[str]) -> None:
     """Record the digests of the `axes`, by name, in the metadata of a new store at `path`.
 
-    From then on, changed metadata are detected. Raises OSError.
+    From then on, changed metadata are detected. Raises OSError if files of the store cannot be read or written.
     """
     document = json.loads(stored(path / _FILE))
     files = [
@@ -109,7 +112,7 @@ def annotate_metadata(
 ) -> None:
     """Add attributes of the study, and friso's notes, to the metadata of the store at `path`.
 
-    Raises StoreError, OSError.
+    Raises StoreError if the metadata are damaged or missing, and OSError if they cannot be written.
     """
     metadata = checked_metadata(path)
     if attributes:
@@ -153,7 +156,11 @@ class _DamagedError(StoreError):
 
 
 def _metadata_in(path: Path, file: str) -> Metadata:
-    """Read the metadata in one `file` of the store at `path`. Raises StoreError."""
+    """Read the metadata in one `file` of the store at `path`.
+
+    Raises StoreError if the file is missing, damaged, not friso's or of another version. It is a _DamagedError if a
+    copy may still be intact.
+    """
     try:
         document = json.loads(stored(path / file))
         entry, metadata = document.get(_OWN), document["metadata"]

@@ -46,9 +46,9 @@ class Request:
         return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
 
     def trial(self) -> Study:
-        """Return a study of a few cells drawn evenly from one that may be too large to be made.
+        """Return a study of a few cells drawn at random from one that may be too large to be made.
 
-        Raises InputError for an axis that the stage cannot have.
+        The same request always gives the same cells. Raises InputError for an axis that the stage cannot have.
         """
         rng = np.random.default_rng(0)
         axes = []

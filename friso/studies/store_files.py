@@ -59,7 +59,8 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
     """Return the arrays that `keep_arrays` wrote into a file, or None.
 
-    None if they are damaged, have another text `about`, or more than `most` bytes; no array is expanded then.
+    The result is None if they are missing, damaged, or have another text `about`. It is also None if they take more
+    than `most` bytes; no array is expanded then.
     """
     try:
         content = stored(file)
@@ -79,7 +80,8 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
 def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
     """Store arrays in an archive, behind a digest that detects damage and exchanged files.
 
-    The digest covers the arrays, the name of the file, and the text `about`. Raises OSError.
+    The digest covers the arrays, the name of the file, and the text `about`. Raises OSError if the file cannot be
+    written.
     """
     archive = io.BytesIO()
     np.savez_compressed(archive, **arrays)
@@ -98,7 +100,7 @@ def _digest(file: Path, about: str, content: bytes) -> bytes:
 def put(file: Path, content: bytes) -> None:
     """Write a file of a store completely or not at all, with the user's usual permissions.
 
-    Raises OSError.
+    Raises OSError if the file cannot be written.
     """
     with whole_file(file) as stream:
         stream.write(content)

@@ -27,7 +27,8 @@ class Traces:
 
     `deviations`, shape (cells, 2 pieces), has two extremes in order of time for each of the equal pieces of `duration`
     [s]. It is NaN after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final
-    behaviour: half of the time after its last corner.
+    behaviour. It lies half-way from the last corner to the end of the run, or from the start if that corner is very
+    late.
     """
 
     deviations: np.ndarray

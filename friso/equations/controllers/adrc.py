@@ -144,14 +144,11 @@ class DisturbanceRejection(ControllerSection):
 
 
 def crossing_ratio(observer_ratio: float) -> float:
-    """Return the loop's 0 dB crossover over `bandwidth`, for a free mass of the assumed size.
+    """Return the loop's 0 dB crossover over the key `bandwidth`, for a free mass as assumed.
 
-    It depends only on the ratio of observer to feedback.
+    The result depends only on `observer_ratio`, the bandwidth of the observer over that of the feedback.
 
-    Examples
-    --------
-    >>> round(crossing_ratio(5.0), 2)
-    2.73
+    Examples -------- >>> round(crossing_ratio(5.0), 2) 2.73
     """
     import numpy as np
 

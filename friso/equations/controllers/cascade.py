@@ -163,7 +163,7 @@ class Cascade(ControllerSection):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's keys, and the integral of the velocity loop as a gain."""
+        """Return the controller's keys and, if it has one, the velocity loop's integral as a gain."""
         listed = super().gains(flat)
         if VELOCITY_TIME not in flat:
             return listed
@@ -201,7 +201,11 @@ class Cascade(ControllerSection):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
-        """Return the force's parts by letter [N]: position loop, velocity, integral, feedforward."""
+        """Return the terms of the force [N] by letter: p, v, i and f.
+
+        p is the command of the position loop times kp, and v the negative velocity times kp. i is the integral of the
+        velocity loop, and f the feedforward. A term that the controller lacks is 0.
+        """
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         with blocks.loop("position"):

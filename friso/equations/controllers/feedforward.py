@@ -34,7 +34,8 @@ def fed_forward(flat: Mapping[str, Any]) -> str:
 def feedforward_of_moves(flat: Mapping[str, Any], *names: str) -> dict[str, float]:
     """Return the feedforward that moving mass and viscous friction require, by key [SI].
 
-    Keys that the controller does not have are left out.
+    `names` are the feedforward keys that the controller can have. Only keys among these whose value is not 0, and that
+    the stage does not set yet, are in the result.
     """
     needed = {"acceleration_feedforward": moving_mass(flat), "viscous_feedforward": flat.get("friction.viscous", 0.0)}
     return {

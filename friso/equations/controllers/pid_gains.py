@@ -163,7 +163,10 @@ class PidGains(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """Return the three terms of the force [N] in Eq. 6, and the feedforward if there is any."""
+        """Return the terms of the force [N] in Eq. 6 by letter: p, i, d and, if there is any, f.
+
+        f is the feedforward; any other term that the controller lacks is 0.
+        """
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

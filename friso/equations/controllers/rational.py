@@ -101,7 +101,10 @@ class RationalController(ControllerSection):
 
     @classmethod
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
-        """Return zeros, poles and gain of the transfer function, in s or in z. Raises InputError."""
+        """Return zeros, poles and gain of the transfer function, in s or in z.
+
+        Raises InputError for keys that give no proper transfer function.
+        """
         raise NotImplementedError
 
     @classmethod
@@ -195,7 +198,7 @@ def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, 
     """Compute integral, static stiffness and sections of a transfer function, by key.
 
     `sample_time` [s] is that of a transfer function in z, None for one in s. Raises InputError for a controller that is
-    unstable or does not pull back.
+    unstable, is not proper, has several integrals, or does not pull back.
     """
     zeros, poles, scale = _times(roots, sample_time)
     infinite = np.isinf(poles)
@@ -317,7 +320,7 @@ def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
 def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
     """Return the roots of a quotient of polynomials, each given from the highest power down.
 
-    Raises InputError.
+    Raises InputError if the coefficients of either are all 0, or if the numerator has the higher degree.
     """
     upper, lower = (np.trim_zeros(np.asarray(part, float), "f") for part in (numerator, denominator))
     if not upper.size or not lower.size:

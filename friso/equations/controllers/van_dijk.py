@@ -113,7 +113,10 @@ class VanDijk(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: str | None) -> Mapping[str, Signal]:
-        """Return the parts of the force [N], by Eq. 7; with `variant`, with the filter of Eq. 6."""
+        """Return the parts "p", "i" and "d" of the force [N], by Eq. 7 of the thesis.
+
+        With a `variant`, the filter of Eq. 6 acts on the derivative alone.
+        """
         k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         if variant:
             return {

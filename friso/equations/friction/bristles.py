@@ -27,9 +27,9 @@ def bristle_friction(
 ) -> Friction:
     """Return friction of a bristle z that deflects at `rate` [m/s]: F = s0 z + s1 z' + s2 v.
 
-    s0, s1, s2 are stiffness, damping and viscous friction. The `kinks` are where derivatives jump; the first one is the
-    reversal of the velocity. `sliding` holds states and modes in steady sliding, where the equations do not determine
-    them.
+    s0, s1, s2 are stiffness, damping and viscous friction. `variant` has the choices of the law's Stribeck curve. The
+    `kinks` are where derivatives jump; the first one is the reversal of the velocity. `sliding` holds states and modes
+    in steady sliding, where the equations do not determine them.
     """
     from friso.equations.component import Component, Output, Role, State, key, state
 

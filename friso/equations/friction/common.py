@@ -118,7 +118,7 @@ def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) ->
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
-    """Return the kink at which the velocity [m/s] changes its direction, which all laws have.
+    """Return the kink of a friction law at which the velocity [m/s] changes its direction.
 
     At a kink derivatives jump. `beyond` is 1 for a positive velocity. Friction may have a peak of width `narrow` [m/s]
     around the kink.

@@ -56,7 +56,7 @@ class Dahl(FrictionSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """Return what measurements would show of Dahl's law: one level of friction at all speeds.
 
-        It has no Stribeck velocity, and only viscous damping at rest.
+        Friction does not fall with speed, and at rest there is no damping but the viscous one.
         """
         coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
         levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])

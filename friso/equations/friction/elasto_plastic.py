@@ -144,7 +144,8 @@ def _break_away_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.n
 def virgin_force(static: float, stiffness: float, begins: float, displacement: np.ndarray) -> np.ndarray:
     """Return the virgin curve, force [N] over displacement [m] from rest, both of shape (n,).
 
-    It solves dz/dx = 1 - alpha(z) z/z_max, with z_max = F_s/sigma_0, by quadrature of dx/dz.
+    `static` [N] and `stiffness` [N/m] are F_s and sigma_0, and bristles begin to slip at the deflection `begins` [m].
+    The curve solves dz/dx = 1 - alpha(z) z/z_max, with z_max = F_s/sigma_0, by quadrature of dx/dz.
     """
     from scipy.integrate import cumulative_simpson
 

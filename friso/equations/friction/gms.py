@@ -60,9 +60,9 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """Return the rule that a list has one value for each element stiffness.
+    """Return the rule that the list `key` has one value for each element stiffness, or none.
 
-    `two` is an example with two elements.
+    In the error message, `what` names a value of the list, and `two` is an example for two elements.
     """
     example = f'element_stiffness = ["70 N/mm", "30 N/mm"], {key.removeprefix("friction.")} = {two}'
     return Rule(

@@ -67,6 +67,6 @@ class LuGre(StribeckSection):
     def active(flat: Mapping[str, Any]) -> str:
         """Return the condition of passivity if it is violated: sigma_2 >= sigma_1 (F_s - F_c)/F_c.
 
-        It is due to Barabanov, Ortega 2000, doi:10.1109/9.839944.
+        The result is "" if the law is passive. The condition is due to Barabanov, Ortega 2000, doi:10.1109/9.839944.
         """
         return bristles_active(flat)

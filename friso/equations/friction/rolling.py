@@ -102,7 +102,8 @@ class Rolling(StribeckSection):
     def active(flat: Mapping[str, Any]) -> str:
         """Return the condition of passivity if violated: sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i.
 
-        It follows from z' v >= -v^2 ((F_s - F_c)/F_c)^i, with the power rounded.
+        The result is "" if the law is passive. The condition follows from z' v >= -v^2 ((F_s - F_c)/F_c)^i, with the
+        power rounded.
         """
         levels, exponent = levels_under_conditions(flat), flat["friction.rolling_exponent"]
         softer = softening(levels.static / levels.coulomb - 1, exponent)

@@ -66,7 +66,10 @@ class Multisine(Motion):
 
     @staticmethod
     def period(flat: Mapping[str, Any]) -> float | None:
-        """Return the time [s] after which all sinusoids repeat; None if it exceeds the duration."""
+        """Return the time [s] after which all sinusoids repeat.
+
+        The result is None if they never repeat together, or only after more than the duration.
+        """
         first, *others = (float(frequency) for frequency in _numbers(flat, FREQUENCY))
         most = max(1, int(first * flat[DURATION]))
         ratios = [Fraction(other / first).limit_denominator(most) for other in others]

@@ -32,5 +32,8 @@ class Release(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the displacement of a motion that is larger by a factor, by key [SI]."""
+        """Return the displacement of a motion that is larger by a factor, by key [SI].
+
+        The result is empty for a displacement of 0.
+        """
         return {DISPLACEMENT: flat[DISPLACEMENT] * factor} if np.any(flat[DISPLACEMENT]) else {}

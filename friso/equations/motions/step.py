@@ -32,5 +32,8 @@ class Step(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the size of a step that is larger by a factor, by key [SI]."""
+        """Return the size of a step that is larger by a factor, by key [SI].
+
+        The result is empty for a step of 0.
+        """
         return {SIZE: flat[SIZE] * factor} if np.any(flat[SIZE]) else {}

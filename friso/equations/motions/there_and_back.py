@@ -92,7 +92,10 @@ class ThereAndBack(Motion):
 
     @staticmethod
     def stretched(flat: Mapping[str, Any], factor: Any) -> Mapping[str, Any]:
-        """Return the acceleration time of a move that is longer by a factor, by key [SI]."""
+        """Return the acceleration time of a move that is longer by a factor, by key [SI].
+
+        The result is empty for a move without duration.
+        """
         return {TIME: flat[TIME] * factor**0.5} if np.any(flat[TIME]) else {}
 
     @staticmethod
@@ -100,7 +103,7 @@ class ThereAndBack(Motion):
         """Return the ranges in which acceleration and its time are varied, by key [SI].
 
         `shares` are the ends of these ranges, as multiples of the stage's own values. The outward move must end before
-        the return.
+        the return. The result is empty for a move of length 0.
         """
         least, most = shares
         acceleration, time = flat[ACCELERATION], flat[TIME]

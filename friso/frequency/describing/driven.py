@@ -47,7 +47,8 @@ class DrivenPlant:
         """Return the forces [N] that move the cart by amplitudes [m], shape (count,).
 
         `which` numbers the frequencies. Also returns the positions of stage and cart over the forces [m/N], complex,
-        (count, 2), and the dynamic stiffness of friction [N/m].
+        (count, 2), and the dynamic stiffness of friction [N/m]. Results are NaN or infinite where friction was not
+        found.
         """
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         compliances = self.compliances[which]
@@ -161,7 +162,8 @@ def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
     """Return zeros of many functions between ends of opposite sign, and the remaining values.
 
-    The method takes the secant of the bracket, and halves the value at an end that stays (Illinois).
+    `ends` are the lower and upper ends, `values` the functions there. The method takes the secant of the bracket, and
+    halves the value at an end that stays (Illinois).
     """
     settings = FrequencySettings.current()
     (low, high), (f_low, f_high) = (end.copy() for end in ends), (value.copy() for value in values)

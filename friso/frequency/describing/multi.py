@@ -130,7 +130,11 @@ def balanced(
 
 
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
-    """Return in words whether a series is a motion, near one of the amplitude `length` [m]."""
+    """Return "done" if a series is a motion of the stage, and otherwise why it is none.
+
+    It is none if Newton's method did not converge, or if the limiter would be touched. Nor is it if its amplitude is
+    tiny against the known motion's, `length` [m], so that the stage rests.
+    """
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
         return REST
@@ -144,8 +148,9 @@ def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> s
 class _Problem:
     """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
 
-    Unknowns are real and imaginary parts of the harmonics, divided by the length, and the logarithm of omega relative
-    to the known motion. The phase is fixed relative to the known motion.
+    Unknowns are real and imaginary parts of the harmonics, divided by `length` [m], the amplitude of the known motion.
+    The last one is the logarithm of omega over the `omega` of that motion. `start` has the harmonics of the known
+    motion, which also fixes the phase.
     """
 
     flat: Mapping[str, Any]

@@ -88,7 +88,7 @@ def plant_response(
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """Return the quantities of every root, by name, with units and text."""
+    """Return the quantities of every root by name: values, SI unit, and a description."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
@@ -105,9 +105,10 @@ def _words(unit: str, text: str) -> dict[str, str]:
 
 
 def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """Return where every root belongs, and the number of roots for each force and frequency.
+    """Return indices of every root in the result, and how many roots each pair has.
 
-    The places are indices of force, frequency, and rank by rising amplitude.
+    A pair is a force at a frequency. The indices are those of force, frequency, and rank by rising amplitude; the
+    counts have the shape (forces, frequencies).
     """
     cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])

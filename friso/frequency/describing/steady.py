@@ -164,7 +164,10 @@ def steady(friction: Imposition) -> PeriodicStates:
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:
-    """Return what fraction of a period must be computed, and the sign of the states after it."""
+    """Return what fraction of a period must be computed, and the sign of the states after it.
+
+    For a symmetric law half a period will do, after which the states have the opposite sign.
+    """
     return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
 
 

@@ -194,7 +194,8 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
     """Survey stages without a closed orbit again at a tighter tolerance, which decides.
 
-    A stage for which only one of both surveys finds an attractor is marked in `flips` and stays undecided.
+    `first` is the earlier survey, whose closed orbits are kept. A stage for which only one of both surveys finds an
+    attractor is marked in `flips` and stays undecided.
     """
     proved = {motion.stage for motion in first.motions if motion.cycles is not None}
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)

@@ -17,7 +17,7 @@ class Recurrence(ArrayRows):
     `swings` is the smallest number of swings after which a run repeats (0: it does not repeat) and `time` [s] their
     duration. `better` and `better_time` [s] are swings and duration of the most accurate repetition, and `deviation` is
     its error over `size`, the peak-to-peak deviation [m]. `earlier` is the same error computed some swings earlier.
-    `mean` [m] is the mean size of single swings.
+    Times and errors are NaN for a run that does not repeat. `mean` [m] is the mean size of single swings.
     """
 
     swings: np.ndarray
@@ -65,8 +65,8 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
 def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
     """Return how far the last turning points are from those `swings` earlier [m], shape (runs,).
 
-    `values` [m], shape (runs, swings), are the turning points. The last are those before column `end`, and the largest
-    difference counts.
+    After an odd number of swings they are compared with mirror images. `values` [m], shape (runs, swings), are the
+    turning points. The last are those before column `end`, and the largest difference counts.
     """
     compared = _compared(swings)
     last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]

@@ -28,9 +28,10 @@ TIGHT = ToleranceSettings().tight_survey_rtol
 class Pending(ArrayRows):
     """Unfinished runs, one for each stage of the ensemble `stages`.
 
-    `states`, shape (runs, kept), are the states with their switched modes, and `durations` [s] the lengths of the next
-    round. `loose` [m] is the distance from which a stage breaks away. `mirrored` marks stages for which the mirror
-    image of a motion is a motion too. Arrays have the shape (runs,) unless stated; `rtol` is the relative tolerance.
+    `states`, shape (runs, kept), are the states, followed by the modes with memory. `durations` [s] are the lengths of
+    the next round. `loose` [m] is the distance from which a stage breaks away. `mirrored` marks stages for which the
+    mirror image of a motion is a motion too. Arrays have the shape (runs,) unless stated; `rtol` is the relative
+    tolerance.
     """
 
     stages: Ensemble
@@ -45,9 +46,9 @@ class Pending(ArrayRows):
 class Ends(ArrayRows):
     """Results of a round of runs, arrays of shape (runs,).
 
-    `states`, (runs, kept), are the final states. A run is `completed`, runs `away` from its reference, or certainly
-    comes to `rest`; `steps` counts solver steps. `repeats` describes how the last swings repeat; `values` [m] and
-    `times` [s] are the turning points, (runs, swings).
+    `states`, shape (runs, kept), are the final states, followed by the modes with memory. A run is `completed`, runs
+    `away` from its reference, or certainly comes to `rest`; `steps` counts solver steps. `repeats` describes how the
+    last swings repeat; `values` [m] and `times` [s] are the turning points, (runs, swings).
     """
 
     states: np.ndarray
@@ -141,8 +142,8 @@ def _stands_still(
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
     """Return runs with a longer next round.
 
-    If a run does not `swing`, shape (runs,), the round must show that it rests or swings slowly. It must not be so long
-    that a run which starts to swing does so for most of the round.
+    `swing`, shape (runs,), marks runs that swing. For any other run the round is long enough to show that it rests or
+    swings slowly. But it is not so long that a run which starts to swing does so for most of the round.
     """
     settings = SurveySettings.current()
     least = np.where(

@@ -38,7 +38,10 @@ class Swinging:
     slope: float = float("nan")
 
     def like(self, other: Swinging) -> bool:
-        """Tell whether two motions of a stage are equal, or mirror images."""
+        """Tell whether two motions of a stage are equal, or mirror images, by size and period.
+
+        Motions of different stages differ, and so do a closed orbit and a motion without one.
+        """
         settings = SurveySettings.current()
         if self.stage != other.stage:
             return False
@@ -83,9 +86,9 @@ class _Beside(ArrayRows):
 
     @property
     def leave_first(self) -> np.ndarray:
-        """Choose the runs farthest from each unstable cycle, which leave it first, (runs,).
+        """Choose a few runs on either side of each unstable cycle, to stand for all on that side.
 
-        They stand for all runs on their side of the cycle.
+        They are among those farthest from the cycle, which leave it first. The result is true for them, shape (runs,).
         """
         settings = SurveySettings.current()
         chosen, far, sides = np.zeros(len(self.cycles), bool), np.abs(self.offsets), np.sign(self.offsets)
@@ -298,7 +301,10 @@ class Survey:
         return chosen
 
     def _beside(self, owners: np.ndarray, ends: Ends) -> _Beside:
-        """Find the nearest unstable cycle that each run resembles, and its offset from the cycle."""
+        """Find the nearest unstable cycle that each run resembles, and its offset from the cycle.
+
+        A run that resembles none gets the number -1 and an offset of 0.
+        """
         settings = SurveySettings.current()
         cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
         for number, kind in enumerate(self._closed):
@@ -389,17 +395,18 @@ class Survey:
     def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
         """Return which runs repeat so well, and with so little recent change, that they will go on.
 
-        Runs near an unstable cycle are left out.
+        `before` [m], shape (runs,), has the mean swing one round earlier. Runs that resemble an unstable cycle, or a
+        motion without a stable orbit, are left out.
         """
         settings = SurveySettings.current()
         same = np.abs(ends.repeats.mean / before - 1) < settings.unchanged_swing_share
         return same & (ends.repeats.deviation < settings.settled_swing_share) & ~self._repels(owners, ends)
 
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs repeat as exactly as only a motion on an attractor does.
+        """Return which runs repeat as exactly as only a motion on an attractor does, shape (runs,).
 
-        Where no proof is needed, runs that clearly approach a repetition count as well. If proof is needed, a run that
-        resembles an unstable cycle counts only if it stays beside it; otherwise it never counts.
+        A run that resembles an unstable cycle counts only if attraction must be proved and another cycle lies beside
+        that one (`_stay`). If no proof is needed, runs that clearly approach a repetition count as well.
         """
         settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
@@ -411,7 +418,10 @@ class Survey:
         return unlike & ((repeats.deviation < settings.converged_swing_share) | approaches)
 
     def _stay(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs beside an unstable cycle repeat so well that they lie on another cycle."""
+        """Return which runs near an unstable cycle stay there, because they lie on another cycle.
+
+        Such a run repeats with an error far smaller than its offset from the unstable cycle. The shape is (runs,).
+        """
         settings = SurveySettings.current()
         offsets = np.abs(self._beside(owners, ends).offsets)
         return (ends.repeats.swings > 0) & (ends.repeats.deviation < settings.exact_repetition_share * offsets)
@@ -467,7 +477,10 @@ def _kinds(
     cycles, leaves_first = beside.cycles, beside.leave_first
 
     def same_kind(k: int, j: int) -> bool:
-        """Tell whether two runs of a stage repeat after equal times with equal swings."""
+        """Tell whether run `k` is of the kind of run `j`: equal swing, and equal time to repeat.
+
+        Two runs that do not repeat may be of one kind. The result is false if run `j` resembles an unstable cycle.
+        """
         same = (
             abs(sizes[k] - sizes[j]) <= near[k] * sizes[j]
             and abs(times[k] - times[j]) <= settings.same_motion_share * times[j]

@@ -64,8 +64,8 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     """Fit a cubic to places over lengths along a branch, shape (n,); return where it turns back.
 
     Of several such points, the one nearest to length 0 counts. The error of the place is twice the scatter about the
-    cubic. Returns None if there are too few places, or if the cubic does not turn within the lengths. It does so too if
-    the error exceeds half of the range of places.
+    cubic. Returns None if there are too few places, or if the cubic does not turn within the lengths. Returns None as
+    well if the error exceeds half of the range of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None

@@ -1,8 +1,8 @@
-"""Follow the edge of hunting in two keys: the curve on which a cycle flips or folds.
+"""Follow the edge of hunting in two keys: the curve on which a cycle changes its stability.
 
-Each point is predicted, then corrected on a line across the curve, along which the cycle forms a branch. At a flip the
-correction moves along the keys. At a fold it moves along the cycle's distance and time, because there is no cycle
-beyond.
+The cycle has a flip, fold or torus there. Each point is predicted, then corrected on a line across the curve, along
+which the cycle forms a branch. At a flip or torus the correction moves along the keys. At a fold it moves along the
+cycle's distance and time, because there is no cycle beyond.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from friso.hunting.cycle.find import RTOL
 
 @dataclass(frozen=True)
 class Spot:
-    """Point of a curve on which a cycle flips or folds.
+    """Point of a curve on which a cycle changes its stability: a flip, fold or torus.
 
     `at`, shape (2,), are its coordinates in the box of the two keys, each from 0 to 1. `special` is the located point
     of the cycle. `across`, shape (2,), is the direction of the line on which it was located.
@@ -41,7 +41,10 @@ class Spot:
 
     @property
     def error(self) -> np.ndarray:
-        """Return the error of the point's coordinates along each key, shape (2,)."""
+        """Return the error of the point's coordinates along each key, shape (2,).
+
+        It is infinite if the error is not known.
+        """
         if not np.isfinite(self.special.error):
             return np.full(2, np.inf)
         return np.abs(self.special.error * self.across)
@@ -49,9 +52,10 @@ class Spot:
 
 @dataclass(frozen=True)
 class Curve:
-    """Curve on which cycles of one kind flip or fold: its spots in order, and its two ends.
+    """Curve on which cycles of one kind change their stability: its spots in order, and ends.
 
-    `sign` is -1 for cycles closed over half a period, 1 for a whole one. Both ends are "closed" for a ring.
+    `kind` says how: by a flip, fold or torus. `sign` is -1 for cycles closed over half a period, 1 for a whole one.
+    Both ends are "closed" for a ring.
     """
 
     kind: Bifurcation

@@ -69,8 +69,8 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress: Progress = silent) -> Diagram:
     """Follow every cycle that is found at `seeds` stages over the range of one key.
 
-    The cycles are those that the return map suggests, and those in which simulations end, of any number of swings.
-    Orbits are closed to the relative tolerance `rtol`.
+    The cycles are those that the return map suggests, and those in which simulations end, of any number of swings. Of
+    the latter, at most `other_branches` (a setting) are followed. Orbits are closed to the relative tolerance `rtol`.
     """
     settings = ContinuationSettings.current()
     places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)

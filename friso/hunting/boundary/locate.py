@@ -42,7 +42,8 @@ class LocatedPoint:
     def in_doubt(self, point: Point) -> bool:
         """Tell whether a cycle of the branch is so near this point that its stability is unknown.
 
-        It is if the cycle lies within the error of the special point.
+        It is if the cycle lies within the error of the special point and has almost its size. The result is false if
+        that error is not known (infinite).
         """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
@@ -117,7 +118,7 @@ def _enclosed(
     def distance(place_along: float) -> float:
         """Return how far the multiplier is from its special value, at a length along the branch.
 
-        The difference has a sign. Raises Unreached.
+        The difference has a sign. Raises Unreached if no cycle can be closed there.
         """
         if place_along not in points:
             nearest = min(points, key=lambda place: abs(place - place_along))
@@ -261,9 +262,10 @@ def corrected(
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
-    """Locate all points of a branch where a multiplier passes the unit circle.
+    """Locate the points of a branch where a multiplier passes the unit circle.
 
-    A fold at which asymmetric cycles only meet the symmetric one is left out.
+    A fold at which asymmetric cycles only meet the symmetric one is left out. A point next to which cycles cannot be
+    closed is left out, too.
     """
     specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [special for special in specials if special and not _meets_symmetric(tracer, special)]

@@ -205,9 +205,10 @@ def _refined(
 
 
 def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
-    """Return a curve's new direction after a step, `chord`, from one of its points to another.
+    """Return the direction of a curve after a step from one of its points to the next.
 
-    The direction `way` stays if the step hardly follows the curve.
+    `chord` is the step, and `way` the direction before it. The direction stays if the step is tiny, or almost across
+    the curve. Directions have length one, shape (2,).
     """
     along, length = abs(float(chord @ way)), float(np.linalg.norm(chord))
     settings = MeetingSettings.current()

@@ -159,7 +159,10 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
 
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
-    """Tell whether a curve passes close to the line between two neighbours."""
+    """Tell whether a curve passes close to the line between two neighbours of the grid.
+
+    `start` and `end` are their coordinates in the box.
+    """
     settings = ContinuationSettings.current()
     points, mesh = curve.points, float(np.linalg.norm(end - start))
     for at in start + np.linspace(0, 1, 9)[:, None] * (end - start):

@@ -41,7 +41,10 @@ class Ensemble:
 
     @classmethod
     def held(cls, flat: Mapping[str, Any], count: int, **options: Any) -> Ensemble:
-        """Make an ensemble of stages with their reference held at 0 instead of their motion."""
+        """Make an ensemble of stages with their reference held at 0 instead of their motion.
+
+        `flat` has the keys of `count` stages in SI, and `options` are further fields.
+        """
         if (form := options.get("form")) is not None:
             options["form"] = form.standing
         return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
@@ -160,9 +163,9 @@ class Ensemble:
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state at which the actuator relaxes, per displacement [s], (count,).
+        """Return the integrator state [s] at which a displaced stage's actuator relaxes, (count,).
 
-        The actuator then exerts the force that it exerts at the reference.
+        It is given per displacement. The actuator then exerts the force that it exerts at the reference.
         """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
@@ -178,8 +181,9 @@ class Ensemble:
     def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
         """Return how far the integrators of sticking stages are from balancing constant forces.
 
-        Only constant forces that friction does not hold need balance. `states` have the shape (count, states), and the
-        result (count,). For the stage `number` alone, they are (n, states) and (n,).
+        The result is in the unit of the integrator's state, with a sign. Only constant forces that friction does not
+        hold need balance. `states` have the shape (count, states), and the result (count,). For the stage `number`
+        alone, they are (n, states) and (n,).
         """
         of = slice(None) if number is None else number
         balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]
@@ -221,10 +225,11 @@ class Ensemble:
     ) -> Results:
         """Run each stage from its state in `starts` for its duration [s].
 
-        A run begins in the switched modes that belong to its state. The `ends` of the result are states alone, or with
-        the modes if `with_modes`. With `variational`, deviations from the run are integrated too; they may be `along`
-        keys (see `KernelRequest`), by the values of the stage's keys. Turning points are kept only with `least_swing`,
-        because a limiter that chatters makes too many. `run_options` are fields of `RunOptions`.
+        A run begins in the modes with memory that belong to its state. The `ends` of the result are states alone, or
+        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too. With
+        `along`, they lead to a motion in which these keys differ, by differences that stand in `flat` (see
+        `KernelRequest`). Turning points are kept only with `least_swing`, because a limiter that chatters makes too
+        many. `run_options` are fields of `RunOptions`.
         """
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
@@ -240,9 +245,10 @@ class Ensemble:
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
-        """Return which runs end in the switched modes in which they began, shape (count,).
+        """Return which runs end with equal modes with memory as they began, shape (count,).
 
-        Runs begin in `states` and end in `ends` (count, kept).
+        Runs begin in `states`, shape (count, states). `ends`, shape (count, kept), are their final states, followed by
+        the modes with memory.
         """
         begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)

@@ -61,10 +61,11 @@ def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: floa
 
 
 def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return at which deviations motions remain that a return map keeps within its range.
+    """Return deviations from a cycle at which motions last, kept within a range by a return map.
 
-    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). The result ascends. A
-    motion that grew at every return is left out: near a multiplier of 1 or -1 it merely leaves slowly.
+    The map takes the deviations `before` a return to those `after` it, each of shape (runs,). The result ascends, and
+    is empty if no motion lasts. A motion that grew at every return is left out: near a multiplier of 1 or -1 it merely
+    leaves slowly.
     """
     settings = OrbitSettings.current()
     inside = (np.abs(before) <= settings.held_range_share) & (np.abs(after) <= settings.held_range_share)

@@ -163,9 +163,9 @@ class Hunting:
     - `returns`: return map of the stage sticking on the positive side (None: the stage cannot hunt).
     - `observed`: attracting swings that are none of the cycles.
     - `target`: how far and how late a run must swing to count as hunting (None: nothing attracts).
-    - `surveyed`: the survey of the stage.
+    - `surveyed`: the survey of the stage (None: it cannot hunt).
     - `lower_gains`: stability of the loop far beyond a force limit without anti-windup (None: no such limit). Unless it
-      is "stable", large motions may diverge, and an observed swing may be `passing`.
+      is "stable", large motions may diverge. With such a limit any observed swing may be `passing`.
     """
 
     cycles: tuple[Cycle, ...]
@@ -186,13 +186,17 @@ class Hunting:
     def passing(self) -> bool:
         """Tell whether an observed swing may be transient, growing or slowly decaying.
 
-        Its size is then only the size at which the run was stopped.
+        That is possible with a force limit without anti-windup. The size of the swing is then only the size at which
+        the run was stopped.
         """
         return self.lower_gains is not None and bool(self.observed)
 
     @property
     def possible(self) -> bool:
-        """Tell whether the stage has friction to stick to and integral action that winds up."""
+        """Tell whether the stage was searched: it has friction or a backlash, and an integral.
+
+        The result is false for a stage with dither, and for one whose reference never stands still.
+        """
         return self.returns is not None
 
 
@@ -319,7 +323,7 @@ def small_cycles_possible(stages: Ensemble) -> np.ndarray:
 def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
     """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    All stages must have friction.
+    All stages must have friction. The result is true for all of them if the law has no steady force.
     """
     settings = OrbitSettings.current()
     breakaway = stages.number("breakaway")[:, None]

@@ -80,7 +80,7 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 def _straight(pairs: np.ndarray) -> float:
     """Fit a straight line without outliers to pairs (points, 2), and return its slope.
 
-    The slope is NaN with too few pairs. A stage that does not break away makes an outlier.
+    The slope is NaN if too few pairs are left. A stage that does not break away makes an outlier.
     """
     settings = OrbitSettings.current()
     if len(pairs) < settings.least_slope_runs:
@@ -101,7 +101,7 @@ def returns_of(
     """Measure how far stages swing [m] on each return, (count, points, returns).
 
     Runs begin beside their orbits, along a direction (count, states), at fractions (1, points) of the sticking
-    distance.
+    distance. Returns that a run does not make are NaN.
     """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]

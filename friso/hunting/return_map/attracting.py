@@ -131,7 +131,8 @@ def _swings(attractor: MapAttractor) -> int:
 def _proposals(mapped: Mapped) -> list[_Proposal]:
     """Return the attractors of all maps, each with the run near it that can be continued.
 
-    It is the run that leads there and ended nearest to the attractor. Attractors without one are left out.
+    Of the runs that lead to an attractor, the one that ended nearest to it is taken. Attractors without such a run are
+    left out.
     """
     proposals = []
     for stage, landing_map in enumerate(mapped.maps):

@@ -243,8 +243,8 @@ class LandingMap:
         """Return the largest relative error of a landing predicted by neighbours, and where it is.
 
         The place is a signed distance. The error is infinite if a stage rests between two landings that continue alike,
-        or the reverse. It is 0 if no three points are close together. Only points whose next landing is at more than
-        half of their distance count.
+        or the reverse. It is 0, and the place NaN, if no three points are close together. Only points whose next
+        landing is at more than half of their distance count.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
@@ -296,9 +296,10 @@ def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.nd
 
 
 def _strays(paths: np.ndarray) -> np.ndarray:
-    """Return by how much paths fail to repeat: the least difference from any cycle earlier.
+    """Return how far paths are from repeating, in coordinates on the map, shape (points,).
 
-    Paths are coordinates on the map, shape (points, landings); the result has the shape (points,).
+    Every landing is compared with the one some swings earlier, and the number of swings that fits best counts. Paths
+    are coordinates on the map, shape (points, landings).
     """
     settings = SurveySettings.current()
     return np.min(

@@ -27,8 +27,9 @@ class Landings(ArrayRows):
     """Runs and their landings, the start first.
 
     `distances` [m], signed, and `times` [s] have the shape (runs, landings), NaN after the last. `count` (runs,) is the
-    number of landings without the start. `ends` (runs, states) are the final states. Runs come to `rest`, diverge
-    (`away`), or are `lost` because they failed, shape (runs,).
+    number of landings without the start. `ends` (runs, kept) are the final states, followed by the modes with memory.
+    Runs come to `rest`, diverge (`away`), or are `lost`, shape (runs,). A run is lost if it failed or diverged, or
+    landed too seldom in the time allowed.
     """
 
     distances: np.ndarray

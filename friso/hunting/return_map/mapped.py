@@ -223,9 +223,10 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 
 
 def unclosed(landing_map: LandingMap) -> list[int]:
-    """Return runs from the nearest and farthest point of a map that must be extended beyond it.
+    """Return the runs of a map's outermost points, where the map must be extended beyond them.
 
-    It must be if the next landing from such a point is not much nearer to the reference.
+    It must be if the next landing from the nearest or farthest point is not much nearer to the reference. The result
+    has the numbers of those runs, and is empty if there are none.
     """
     settings = ReturnMapSettings.current()
     runs = []
@@ -253,9 +254,10 @@ def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[fl
 
 
 def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
-    """Return starts to add where neighbouring runs land differently, or one of them not at all.
+    """Return starts to add where neighbouring runs land very differently, or just one lands.
 
-    An attractor may reach up to such a break of the map. `starts` ascend; `landings`, (runs,), are the first landings.
+    An attractor may reach up to such a break of the map. `starts`, shape (runs,), ascend; `landings`, (runs,), are the
+    first landings. All are in deflections of the loop by the break-away force. The list may be empty.
     """
     settings = ReturnMapSettings.current()
     lands = np.abs(np.nan_to_num(landings)) >= SurveySettings.current().least_swing

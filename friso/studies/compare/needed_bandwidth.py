@@ -34,9 +34,10 @@ class NeededBandwidth:
     shares: np.ndarray
 
     def turning(self, enough: float) -> int | None:
-        """Return the index of the bandwidth from which enough machines come to rest, or None.
+        """Return the index of the bandwidth from which on enough machines come to rest.
 
-        `enough` is the fraction of machines that counts as enough.
+        `enough` is the fraction of machines that counts as enough. Returns None if the highest bandwidth does not reach
+        it.
         """
         missed = np.flatnonzero(self.shares < enough)
         first = int(missed[-1]) + 1 if missed.size else 0

@@ -201,8 +201,9 @@ def options(
 def _faster(stage: Stage, situation: Situation) -> Variant:
     """Return a stage with the highest bandwidth at which the file's machine keeps its margin.
 
-    The bandwidth stays below the limit of the `situation`. An engineer tunes one machine, and all others get its
-    settings. Raises UnavailableError if the present bandwidth is already that high.
+    The bandwidth stays below the limit of the `situation`, and a stated crossover far enough below the sampling
+    frequency. An engineer tunes one machine, and all others get its settings. Raises UnavailableError if the present
+    bandwidth is already that high, or above the limit.
     """
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
@@ -253,7 +254,7 @@ def _with_setting(setting: Setting, situation: Situation) -> Variant:
 def _rejecting(situation: Situation) -> Variant:
     """Return the locked stage with disturbance rejection, as fast as the present controller.
 
-    Raises UnavailableError if that cannot be.
+    Raises UnavailableError if the present loop crosses 0 dB nowhere, or if the result is no valid stage.
     """
     flat = situation.locked.flat()
     crossings = margins(linear_flat(situation.locked, flat), limit_cases(flat)["sliding"]).crossovers

@@ -51,7 +51,7 @@ def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
     """Return how much more probable an event is with a change than `before`, on paired machines.
 
     `flags` and `before`, (count,), are true for machines with the event. The interval is Wald's, with half a machine
-    added to every cell (Agresti, Min 2005, doi:10.1002/sim.1781).
+    added to every cell (Agresti, Min 2005, doi:10.1002/sim.1781). The result is NaN without machines.
     """
     count = len(flags)
     if not count:

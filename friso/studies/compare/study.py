@@ -85,7 +85,10 @@ class OptionResult:
 
     @property
     def stays(self) -> Share:
-        """Return the probability of staying in position in the last half of a `LONGER` run."""
+        """Return the probability of staying in position in the last half of a `LONGER` run.
+
+        The result is NaN without longer runs.
+        """
         if not self.later.done.size:
             return Share(np.nan, np.nan, np.nan)
         return share(self.later.stays, self.later.done)

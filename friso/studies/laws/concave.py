@@ -33,7 +33,7 @@ class ConcaveFit:
 
     @property
     def corners(self) -> np.ndarray:
-        """Return the knots at which some part of the curve ends, at most n."""
+        """Return the knots at which a part of the curve ends; knots without a part are left out."""
         return self.knots[self.strength.any(axis=0)]
 
     @property

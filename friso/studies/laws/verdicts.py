@@ -255,9 +255,9 @@ def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> Ot
     """Return friction keys of stages under each other law that keeps their measured friction.
 
     The stages differ in numbers of their friction. The keys' values [SI] are as converted and, for each key that
-    measurements leave open, at both ends of its range. They come by the names of law and key. Laws that keep the
-    measured friction of some stages only are left out. Raises InputError for a stage whose law cannot say what would be
-    measured.
+    measurements leave open, at both ends of its range. They come by the names of law and key. A law that keeps the
+    measured friction of some stages only is listed as lost, with the numbers of the others. Raises InputError for a
+    stage whose law cannot say what would be measured.
     """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}

@@ -149,9 +149,9 @@ class RailRuns:
     - `above`, `below` [m]: mean heights of swings on both sides of the reference, after half of the run.
     - `rising`: fraction of the period in which the deviation rises.
     - `period_scatter`: standard deviation of the period over its mean; `height_scatter`: standard deviation of the
-      heights over the swing (NaN with fewer than three swings).
+      heights over the swing.
 
-    Runs that failed have NaN, and no peaks.
+    The last five are NaN with fewer than three swings to either side. Runs that failed have NaN, and no peaks.
     """
 
     peaks: np.ndarray
@@ -252,7 +252,7 @@ def rail_runs(recorded: RecordedRuns) -> RailRuns:
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return times [s] and values [m] of the turning points of a sampled deviation.
 
-    A flat stretch counts as a turn at its end.
+    Where the deviation stays level at a turn, the last of the level samples counts.
     """
     ways = np.sign(np.diff(values))
     moving = np.flatnonzero(ways)
@@ -261,10 +261,11 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Return the shape of the swings in a run's last half, NaN if it does not swing.
+    """Return the shape of the swings in a run's last half: five numbers.
 
-    The five numbers are `above`, `below`, `rising`, `period_scatter` and `height_scatter` of `RailRuns`. They follow
-    from turning points, times [s] and values [m], and the `swing` peak to peak. The run `ended` at a time [s].
+    They are `above`, `below`, `rising`, `period_scatter` and `height_scatter` of `RailRuns`. They follow from turning
+    points, times [s] and values [m], and the `swing` peak to peak. The run `ended` at a time [s]. All are NaN if the
+    run does not swing, or has fewer than three swings to either side.
     """
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):

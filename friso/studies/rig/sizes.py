@@ -93,7 +93,7 @@ def friction(stage: Stage) -> float:
 def travel(stage: Stage) -> tuple[float, float]:
     """Return the two ends [m] of the stage's own motion.
 
-    If the motion does not move, they are a hundred strokes to either side of it.
+    If the motion does not move, they are a hundred strokes to either side of it; without a stroke, 0.1 m.
     """
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
@@ -112,6 +112,9 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def interval(stage: Stage, length: float) -> float:
-    """Return a log's sample time [s]: at most `length`, in whole samples of the drive."""
+    """Return a log's sample time [s]: at most `length`, in whole samples of the drive.
+
+    It is at least one such sample, even if that is longer than `length`.
+    """
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

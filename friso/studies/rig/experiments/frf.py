@@ -178,7 +178,10 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
 
 
 def locked_plant(logs: list[RigLog]) -> Plant:
-    """Return the plant with its joint locked, from logs: averaged response and lowest mass line."""
+    """Return the plant with its joint locked, from logs: averaged response and lowest mass line.
+
+    The mass is unknown if the response shows no mass line.
+    """
     averaged = estimate_plant(logs)
     lines = mass_lines(averaged)
     nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
@@ -203,7 +206,8 @@ def free_plant(logs: list[RigLog]) -> Plant:
 def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
     """Return the median of force over acceleration [kg] between two frequencies [Hz].
 
-    The range of the estimate is that of the middle half of the values.
+    The range of the estimate is that of the middle half of the values. The mass is unknown if the response has no
+    frequencies in between.
     """
     inside = (response.frequency >= low) & (response.frequency <= high)
     method = f"force over acceleration, {low:.3g} to {high:.3g} Hz"

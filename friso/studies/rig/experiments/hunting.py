@@ -77,12 +77,13 @@ class Startable:
 class HuntingResult:
     """Results of the hunting experiment.
 
-    `cases` are the outcomes of the moves, joint locked and free, arrays of shape (crossovers, rails). They are at
-    `crossovers` [Hz] on `rails` (seeds, the stage's own first). `started` are the outcomes of releases with the joint
-    locked, shape (displacements, crossovers, rails), by `displacements` [m]. `plotted` are the indices of the thesis's
-    crossovers. `rail` is the index of the rail of the logs and of the `traces`, by case and index of the crossover. It
-    is the first one with counted peaks, locked, at the stage's own crossover, or else the stage's own. `startable` is a
-    machine that comes to rest after the move but hunts after a release, None if there is none.
+    `distance` [m] is the length of the move. `cases` are the outcomes of the moves, joint locked and free, arrays of
+    shape (crossovers, rails). They are at `crossovers` [Hz] on `rails` (seeds, the stage's own first). `started` are
+    the outcomes of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
+    `plotted` are the indices of the thesis's crossovers. `rail` is the index of the rail of the logs and of the
+    `traces`, by case and index of the crossover. It is the first one with counted peaks, locked, at the stage's own
+    crossover, or else the stage's own. `startable` is a machine that comes to rest after the move but hunts after a
+    release, None if there is none.
     """
 
     distance: float

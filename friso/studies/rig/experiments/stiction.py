@@ -84,7 +84,10 @@ def _note(flat: Mapping[str, Any]) -> str:
 
 
 def slow_speed(stage: Stage) -> float:
-    """Return the speed [m/s] that loads a sticking cart up to friction in `LOADS` periods."""
+    """Return the speed [m/s] that loads a sticking cart up to its friction in `LOADS` periods.
+
+    The periods are those of the crossover.
+    """
     return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
 
 
