@@ -58,9 +58,9 @@ def growth(margins: Margins) -> str:
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
-    """Write a margin by `text`, or say that any change is allowed or the margin is not known.
+    """Write a margin by `text`; a dash if it is NaN.
 
-    Any change is allowed if the margin equals `none`.
+    If the margin equals `none`, the text says that any change is allowed.
     """
     if math.isnan(value):
         return NOTHING

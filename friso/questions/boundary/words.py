@@ -185,7 +185,10 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where the curve with this index runs, and how it ends there."""
+    """Say from where to where the curve with this index runs, and how it ends there.
+
+    Values have `digits` digits.
+    """
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
@@ -206,7 +209,7 @@ def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say for each meeting of two curves where they meet, and whether one cycle changes there."""
+    """Say for each meeting of two curves where they meet, and whether both change one cycle."""
     return [_meeting(meeting, lines(traced), keys) for meeting in curve_meetings(traced)]
 
 

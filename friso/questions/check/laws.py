@@ -122,7 +122,10 @@ def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
-    """Say over which bandwidths the edge of hunting lies under all laws."""
+    """Say between which bandwidths the edge of hunting lies, over all friction laws.
+
+    If there is no edge, or it was not searched under some laws, the text says so.
+    """
     edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""

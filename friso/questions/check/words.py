@@ -222,7 +222,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say how large the force limit is, and that break-away takes more, if it does."""
+    """Say how large the force limit is, and if break-away takes more; empty without a limit."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)

@@ -282,7 +282,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
 
 
 def _as_is(comparison: Comparison) -> str:
-    """Say what the machines do without any option, unless they come to rest."""
+    """Say what the machines do as they are, in option a; empty if enough of them come to rest."""
     base, count = comparison.results[0], comparison.machines.count
     if base.rests:
         return ""
@@ -340,7 +340,7 @@ def _failing(comparison: Comparison) -> list[str]:
 
 
 def _in_the_longer_run(result: OptionResult) -> str:
-    """Say how many machines stay in position in the longer run; empty if none was made."""
+    """Say how many machines stay in position in a longer run; empty if there was no such run."""
     if not result.later.done.size:
         return ""
     return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"

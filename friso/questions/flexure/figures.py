@@ -68,7 +68,10 @@ def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]
 def _lines(
     flexure: BothModels, of: Callable[[Evaluation], Array], smooth: Smooth
 ) -> tuple[tuple[Series, ...], Markers]:
-    """Return a quantity over the deflection as a line for each model, and the best one's points."""
+    """Return a quantity over the deflection as a line for each model, and the best one's points.
+
+    `of` reads the quantity from an evaluation, and `smooth` interpolates it between deflections.
+    """
     fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
         Series(

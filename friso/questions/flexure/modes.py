@@ -131,9 +131,9 @@ def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
 
 
 def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
-    """Return the lines of the leaves in a view.
+    """Return the lines of the leaves in a view, at rest and moved.
 
-    They are middle lines from the side, outlines from above, and cross-sections along the leaves.
+    Leaves are middle lines if seen from the side, outlines from above, and cross-sections along their length.
     """
     draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
     return [

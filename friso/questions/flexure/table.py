@@ -50,7 +50,7 @@ def _plain(value: float) -> str:
 def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
     """Return a row for each mode that a model knows, in the order of frequency.
 
-    The drive mode comes first.
+    The drive mode comes first: the stage moves along the direction in which it is driven.
     """
     named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}

@@ -139,7 +139,10 @@ def _borne(evaluation: Evaluation) -> list[str]:
 
 
 def _loaded(evaluation: Evaluation) -> list[str]:
-    """Say how a load along the leaves changes stiffness and drive mode."""
+    """Say how a load along the leaves changes stiffness and frequency in the drive direction.
+
+    The list is empty without a load.
+    """
     load = float(evaluation.mechanism.load)
     if not load:
         return []

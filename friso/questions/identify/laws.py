@@ -36,7 +36,7 @@ def law_sentence(comparison: LawComparison) -> str:
 
 
 def _predict(laws: Sequence[LawPrediction]) -> str:
-    """Write "predicts" or "predict" for so many laws."""
+    """Return the verb for a number of laws: "predicts" for one, "predict" for several."""
     return "predicts" if len(laws) == 1 else "predict"
 
 

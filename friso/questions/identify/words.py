@@ -209,7 +209,10 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """Return a row on the samples used, if logs have gaps: those of the longest stretch without."""
+    """Return a row on how many samples were used, for logs with gaps; empty if no log has any.
+
+    Only the longest stretch without a gap is used.
+    """
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
         return ()

@@ -44,9 +44,9 @@ def _panel(channel: ChannelContent) -> Panel:
 
 
 def _within_range(values: np.ndarray) -> np.ndarray:
-    """Return the values that a picture can show, which no instrument exceeds.
+    """Return the values that a picture can show, at most `largest_value` (a setting) in size.
 
-    Larger values become NaN, and values next to 0 become 0.
+    Larger values become NaN, and values smaller than its inverse become 0.
     """
     settings = LogSettings.current()
     sizes = np.abs(values)

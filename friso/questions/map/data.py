@@ -136,9 +136,10 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 
 
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an axis with its values, and the value there of the machine with the keys `flat`.
+    """Return an axis with its values at `positions`, the indices of the cells on the page.
 
-    The machine's value is null beyond the ends of the axis.
+    The value of the machine with the keys `flat` is added. It is null for an axis of words, and beyond the ends of the
+    axis.
     """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)

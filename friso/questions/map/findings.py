@@ -40,10 +40,10 @@ _QUIET = ("transient", "settles")
 
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return the first statement of a map: where, and in which fraction of it, its finding holds.
+    """Return the first statement on a map, such as in which fraction of it stages hunt.
 
-    The metric declares its findings (`Metric.findings`). Doubts follow the statement, which is empty if the runs have
-    no outcome.
+    The metric declares what is stated (`Metric.findings`). Doubts follow. The result is empty if the runs have no
+    outcome.
     """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
@@ -105,9 +105,10 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
 
 
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
-    """Mark the range of an axis in which a finding holds, from its first to its last cell.
+    """Mark the cells of an axis in the range in which a finding holds, shape (n,).
 
-    On an axis of words, only the words at which it holds are marked.
+    The range lasts from the first of the `cells` in which it holds to the last. On an axis of words, only words at
+    which it holds are marked.
     """
     held = axis.positions[cells]
     if axis.words:

@@ -409,7 +409,10 @@ def _filled(
     """Run the cells that a store lacks; return the runs, and whether the store can be written.
 
     If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is only read. With `beside`, it is refused, since the names of figures beside a store are noted in it.
+    is only read.
+
+    With `beside`, figures are written beside the store, which notes their names. Raises StoreError for a store that
+    must be written and cannot be.
     """
     stored = 0
 

@@ -72,7 +72,7 @@ class Varied:
     ) -> Varied:
         """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-        Raises InputError.
+        Raises InputError for an axis or a link that is not usable.
         """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(

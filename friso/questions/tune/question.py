@@ -213,7 +213,10 @@ def _goal(
 
 
 def _moves(text: str, stage: Stage) -> MoveRange:
-    """Read the range of moves, with the accelerations of [moves]. Raises InputError."""
+    """Read the range of moves FIRST..LAST, with the accelerations of [moves].
+
+    Raises InputError for a text without two lengths, or whose first length is the larger one.
+    """
     length, stated = Quantity("m", positive, "10 um").on(stage.axis_kind), MoveRange.of_stage(stage, 0.0)
     first, _, last = text.partition("..")
     largest = Quantity("m", positive, "32 mm").on(stage.axis_kind).example

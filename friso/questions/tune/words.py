@@ -81,7 +81,7 @@ def time(seconds: float) -> str:
 
 
 def slowest_time(measured: Performance, goal: Goal) -> str:
-    """Write the time within which 95 % of the machines are in position, with its interval."""
+    """Write the time in which enough machines are in position (`goal.share`), with its interval."""
     low, high = measured.slowest_interval(goal)
     alone = time(measured.slowest(goal))
     if not math.isfinite(low):
@@ -228,7 +228,10 @@ def _interrupted(tuning: Advice) -> list[str]:
 
 
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
-    """Say what to set for a remedy, and what that brings and costs."""
+    """Say what to set for a remedy, and what that brings and costs.
+
+    `what` begins the first sentence, such as "The least change".
+    """
     assert outcome.stage is not None
     assert outcome.measured is not None
     return [
@@ -484,10 +487,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield first the part of the goal that no setting of a remedy meets.
+    """Yield sentences on why no setting of a remedy meets the goal; the first one is the reason.
 
-    Only settings that meet the parts before count. If some meet all parts, it says that none surely does on fresh
-    machines, or that it is not known whether they hunt.
+    Each names a part of the goal that no setting meets, of those that meet the parts before. If some settings meet all
+    parts, the sentence says that none surely does on fresh machines, or that it is not known whether they hunt.
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
