@@ -116,7 +116,10 @@ def _in_order(
 
 
 def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
-    """Evaluate a geometry by the beam model. Raises BeamFailure."""
+    """Evaluate a geometry by the beam model.
+
+    Raises BeamFailure if the model finds no solution.
+    """
     return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
 
 

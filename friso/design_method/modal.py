@@ -85,9 +85,9 @@ def _turns(ratio: np.ndarray) -> np.ndarray:
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """Return the contribution of all modes but the drive mode to the plant [m/N].
+    """Return what the leaf springs' modes add to the plant [m/N], shape (frequencies,).
 
-    `omega` are frequencies [rad/s]; the result has shape (frequencies,).
+    The first mode, the motion in the drive direction, is left out. `omega` are frequencies [rad/s].
     """
     zeta = float(leaves.mechanism.damping_ratio)
     parts = [

@@ -221,9 +221,9 @@ def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputE
 def output_folder(
     command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
 ) -> OutputFolder | None:
-    """Return the folder that a command writes into, if any.
+    """Return the folder that a command writes into; None if no `folder` was named.
 
-    Raises InputError as `OutputFolder`.
+    Raises InputError if the command must not write there, or cannot.
     """
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
@@ -241,7 +241,10 @@ def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress
 
 @contextmanager
 def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Iterator[Drafts]:
-    """Provide the drafts of some files. Raises OSError."""
+    """Provide the drafts of some files, which are deleted unless put in place.
+
+    Raises OSError if a draft cannot be written.
+    """
     with Drafts() as drafts:
         for number, (path, content) in enumerate(files.items()):
             progress(number, len(files), "files")

@@ -25,7 +25,8 @@ _TRIES = 3
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
     """Make a new, locked folder that only this user may open; remove it in the end.
 
-    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError.
+    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError if no folder
+    can be made and locked.
     """
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)

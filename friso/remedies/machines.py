@@ -62,7 +62,7 @@ class MoveRange:
     def check(self, stage: Stage) -> None:
         """Check that the motion has time for the largest move at the lowest acceleration.
 
-        Raises InputError.
+        Raises InputError if it has not.
         """
         flat = stage.flat()
         slow = {ACCELERATION: self.accelerations[0]} if self.accelerations and ACCELERATION in flat else {}
@@ -158,7 +158,9 @@ def draw_fleet(
 
     The first machine is the stage file's own, with its own move or the nearest one of the range. The other moves fill
     the range evenly. Without `moves`, all machines make the file's move. A joint that is not in the file varies by the
-    default spreads. Raises InputError.
+    default spreads.
+
+    Raises InputError for an unusable number or seed, and if hardly any machine drawn is valid.
     """
     own = float(size(stage.flat()))
     moves = moves or MoveRange(own, own)

@@ -48,11 +48,13 @@ class TriedPoints:
     """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for 95 % of the machines. They are `settling` within the tolerance, `looser` within a looser one, and
-    `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest force [N] and least
-    modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the stage file's machine, where its loop
-    last crosses 0 dB. `nearness`, from 0 to 1, grows with the number of machines that settle or nearly settle.
-    `moves_from` [m] is the smallest move from which all machines settle; infinite if the largest move does not settle.
+    times [s] hold for the fraction `goal.share` of the machines. They are `settling` within the tolerance, and `looser`
+    within a looser one. `slower` is for the looser one, too, at a bandwidth lower by the distance from hunting. Largest
+    force [N] and least modulus margin hold for the same fraction.
+
+    The bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1,
+    grows with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
+    machines settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """

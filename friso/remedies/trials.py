@@ -78,7 +78,7 @@ def moves_of_points(
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Return sampling, delay and current loop of a stage, as numbers in SI by key."""
+    """Return the keys of a stage's [drive] as numbers in SI, such as sample time and delay."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 

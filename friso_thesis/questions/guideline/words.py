@@ -51,7 +51,7 @@ def _rates(law: FittedLaw) -> list[str]:
 
 
 def _power(group: str, exponent: float) -> str:
-    """Write a group, divided by its reference, to a power."""
+    """Write a dimensionless group, divided by its reference, to a power: "(.../2)^0.50"."""
     written, reference = GROUPS[group].written, REFERENCE[group]
     base = f"({written})" if reference == 1 else f"({written}/{reference:g})"
     if group == "gap":
@@ -67,7 +67,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def log_error(off: float) -> str:
-    """Return an error of a logarithm as a fraction: 0.1 is 11 %."""
+    """Write an error of a natural logarithm in percent of the number: 0.1 is "11 %"."""
     return f"{percent(math.expm1(off))}"
 
 

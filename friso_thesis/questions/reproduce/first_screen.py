@@ -30,7 +30,7 @@ class Remark:
 
     @property
     def command(self) -> str:
-        """Return the command that shows more."""
+        """Return the command that judges the claim alone, and shows more about it."""
         return f"friso reproduce --only {self.claim}"
 
 

@@ -80,12 +80,15 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return the word of agreement if attractors judge the claim; "" if that does not matter."""
+    """Return how far a claim agrees, in a word, if it is judged by what attracts the stages.
+
+    The result is "" if this was not computed or does not matter.
+    """
     return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
 
 
 def criterion_word(part: Part) -> str:
-    """Return the word that says how far a criterion agrees."""
+    """Return "agrees" or "does not agree" for a criterion, or "undecided"."""
     return "undecided" if part.undecided else "agrees" if part.holds else "does not agree"
 
 

@@ -99,9 +99,9 @@ class Fit:
 class Guideline:
     """All results of the guideline, as in `docs/evidence/guideline.md`.
 
-    They are the number of groups by part of the stage, both laws, the worked steps, and what a parasitic mode allows.
-    Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps came from an
-    interrupted run.
+    They are the number of dimensionless groups by part of the stage, both laws, the worked steps, and what a parasitic
+    mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps
+    came from an interrupted run.
     """
 
     samples: int
@@ -213,9 +213,9 @@ def checked_samples(samples: int) -> None:
 
 
 def group_counts() -> dict[str, Count]:
-    """Return the numbers of parameters and groups of the rigid rig, with joint, and with mode.
+    """Return the numbers of parameters and dimensionless groups of three structures, by name.
 
-    The mode is the parasitic one.
+    They are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
     """
     return {
         "rigid": group_count(plain_rig()),
@@ -235,7 +235,7 @@ def _sizes(samples: int) -> dict[str, int]:
 
 
 def _steps(sizes: Mapping[str, int]) -> int:
-    """Return the number of progress steps of all sweeps.
+    """Return the number of progress steps of all sweeps; `sizes` are their samples by name.
 
     A sample with a free joint is also computed with the joint locked.
     """

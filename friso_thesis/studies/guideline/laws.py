@@ -109,9 +109,9 @@ class FittedLaw:
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
     def edge(self, values: SampleValues, locked: np.ndarray | None = None) -> np.ndarray:
-        """Return the edge of stages with these groups, in units of sqrt(sigma_0/m).
+        """Return the edge of stages by their dimensionless groups, in units of sqrt(sigma_0/m).
 
-        `locked` is the edge with the joint locked.
+        `locked` is the edge with the joint locked, which only the law of the free joint needs.
         """
         rates = self.log_rates(values)
         return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])

@@ -57,7 +57,10 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
-    """Return which stages still swing at the end, and which runs were completed, both (count,)."""
+    """Return which stages still swing at the end, and which runs were completed, both (count,).
+
+    Runs last `periods` slow periods of the stage after the motion is over.
+    """
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = RunOptions(

@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def edge(self) -> np.ndarray:
-        """Return the edges of the samples."""
+        """Return the crossovers at the edges, in units of sqrt(sigma_0/m); NaN without an edge."""
         return self.edges.crossover
 
     @property
@@ -119,7 +119,7 @@ def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
-    """Return the edges of samples of rigid masses.
+    """Return the edges of `count` samples of rigid masses; finished parts are stored by `keep`.
 
     A locked joint is almost a rigid mass: it differs only by the contact of its fixtures.
     """

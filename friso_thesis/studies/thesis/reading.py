@@ -135,7 +135,7 @@ OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
 
 
 def others_of(words: Set[str]) -> dict[str, WordReading]:
-    """Return the other readings that differ in one of these words."""
+    """Return the other readings, by description, that give one of these words another number."""
     return {
         name: other
         for name, other in OTHERWISE.items()

@@ -74,7 +74,7 @@ def _kept(values: Mapping[str, float], name: str) -> Counted:
 
 @cache
 def own_runs(rtol: float) -> Mapping[str, Counted]:
-    """Run the cases with friso at a relative tolerance.
+    """Run friso at a relative tolerance on the runs that are compared (`CASES`), by name.
 
     The swing is 0 for a stage that does not swing at the end.
     """
