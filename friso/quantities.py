@@ -145,11 +145,11 @@ class Motor(NamedTuple):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A key that takes number and unit: `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`.
+    """A key that takes number and unit, as an annotation declares it.
 
-    `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are
-    declared as on a linear axis; `on` gives them as on another, named in `axis`. Where `motor` is known, a force may
-    be written in amperes.
+    An example is `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`. `unit` is the SI unit of the
+    values. If it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are declared as on a linear axis; `on`
+    converts them to another, which `axis` names. If `motor` is known, a force may be written in amperes.
     """
 
     unit: str

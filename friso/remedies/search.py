@@ -269,7 +269,7 @@ class Search:
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Return coordinates between grid points at which a variable reaches the bandwidth limit.
 
-        The bandwidth rises through the limit there.
+        The bandwidth rises through the limit there. The list is empty if the goal has no limit.
         """
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit

@@ -78,7 +78,7 @@ def dash(name: str) -> Dash:
 
 
 def place(member: Members, bode: Bode) -> str:
-    """Return a state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
+    """Return a state in words that tell it from others: "sliding at 1.78 mm/s, limiter free"."""
     return in_words(cart(member, bode), bool(member.touched[0]), has_limiter(bode))
 
 

@@ -178,7 +178,10 @@ def _speeds(unstable: Unstable, bode: Bode) -> str:
 
 
 def _why(bode: Bode) -> list[str]:
-    """Say why states are unstable: by friction that falls with speed, or by tuning."""
+    """Say why states are unstable: by friction that falls with speed, or by tuning.
+
+    The list is empty if neither explains all unstable states.
+    """
     settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
     if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
         even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""

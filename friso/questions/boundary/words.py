@@ -119,7 +119,10 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say at which of the values tried the loop is unstable, whatever the friction."""
+    """Say at which of the values tried the loop is unstable, whatever the friction.
+
+    The list is empty if it is stable at all of them.
+    """
     if not traced.unstable.any():
         return []
     points = traced.places[:, None] if isinstance(traced, Diagram) else traced.space.grid(traced.nodes)[traced.allowed]
@@ -361,7 +364,10 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say near which points hunting changes although no curve could be followed from there."""
+    """Say near which points hunting changes although no curve could be followed from there.
+
+    The list is empty if there are no such points.
+    """
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
@@ -381,7 +387,7 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _ends(line: Line) -> str:
-    """Say how a line ends, to follow the words on where it runs."""
+    """Say how a branch of cycles ends at both ends, as the last part of a sentence."""
     if set(line.ends) == {END_OF_RANGE}:
         return ", to both ends of the range"
     return f"; ends: {'; '.join(dict.fromkeys(line.ends))}"

@@ -52,7 +52,7 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 def _return_map(item: ShownCase) -> list[Panel]:
     """Return the panel of a stage's return map; none if swings were not followed.
 
-    It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
+    The panel shows the map, the diagonal, the swings of the stage's own motion, the cycles, and the basin of hunting.
     """
     hunting = item.case.judgement.hunting
     if hunting.returns is None:

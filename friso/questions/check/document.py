@@ -158,7 +158,7 @@ def _margin(edge: Margin) -> dict[str, Any]:
 
 
 def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
-    """Return one end of the bandwidths at which hunting attracts."""
+    """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
     return {

@@ -276,7 +276,7 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return the case, its verdict not certain if the drive alone makes the loop unstable."""
+    """Return a case of the check, not certain if the drive's sampling makes the loop unstable."""
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")

@@ -88,7 +88,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say where the loop is unstable, even without friction or by the drive alone."""
+    """Say where the loop is unstable, even without friction or by the drive alone; else empty."""
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -244,7 +244,10 @@ def _settling(case: Case) -> str:
 
 
 def _later(case: Case) -> str:
-    """Say that a motion which still swings at the end of its run comes to rest later."""
+    """Say that a motion which still swings at the end of its run comes to rest later.
+
+    The text is empty if its settling time is known, and unless it swings by 10 um or more about its reference.
+    """
     if case.in_the_end.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON or case.offset > _TEN_MICRON:
         return ""
     return f" (later than in its run of {with_unit(case.stage.flat()['motion.duration'], 's')})"
@@ -383,7 +386,10 @@ def _elsewhere(case: Case) -> str | None:
 
 
 def _windows(case: Case) -> list[str]:
-    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again."""
+    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again.
+
+    The list is empty if there are no such ranges.
+    """
     places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
@@ -403,7 +409,10 @@ def _window(case: Case, window: BandwidthWindow) -> str:
 
 
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
-    """Say what the survey of bandwidths may have missed between its steps."""
+    """Say what the survey of bandwidths may have missed between its steps.
+
+    The list is empty if no case has a margin in bandwidth.
+    """
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
@@ -467,7 +476,10 @@ def _faster(case: Case, edge: Margin) -> str:
 
 
 def _with_other_friction(case: Case) -> str:
-    """Say whether the bandwidth advised keeps a margin in static friction."""
+    """Say whether the bandwidth advised keeps a margin in static friction.
+
+    The text is empty if this was not examined.
+    """
     if case.advice_keeps_friction is None:
         return ""
     distance = SEARCH_LIMITS.edge_distance

@@ -113,7 +113,10 @@ def _worst(corners: Corners, design: Design) -> list[str]:
 
 
 def _gap(design: Design) -> list[str]:
-    """Compare the friction lost at break-away with what hunting needs according to the thesis."""
+    """Compare the friction lost at break-away with what hunting needs according to the thesis.
+
+    The list is empty for a friction law that has no static and Coulomb friction.
+    """
     losses = gaps(design.without, design.original.flat())
     if losses is None:
         return []

@@ -285,5 +285,5 @@ def sentences(design: Design | UnfinishedDesign) -> list[str]:
 
 
 def next_steps(design: Design | UnfinishedDesign, files: Sequence[Path]) -> list[str]:
-    """Return the command that checks the design."""
+    """Return the command that checks the design; empty if no file was written."""
     return [f"friso check {shell_word(str(files[0]))}"] if files else []

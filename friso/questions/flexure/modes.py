@@ -62,7 +62,10 @@ def modes_figure(evaluation: Evaluation) -> Figure:
 
 
 def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
-    """Return the panel of one mode, enlarged to be visible."""
+    """Return the panel of one mode, with the motion enlarged so that it can be seen.
+
+    `visible` is true if actuator and sensor both see the mode, which sets colour and label.
+    """
     view = best_view(mechanism, mode)
     axes = VIEWS[view]
     shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]

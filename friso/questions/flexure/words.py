@@ -51,7 +51,7 @@ def warnings(flexure: BothModels) -> list[str]:
 
 
 def assumptions(stage: Stage) -> list[str]:
-    """Say what is assumed for keys that the stage file leaves out."""
+    """Say what is assumed for keys that the stage file leaves out; empty if it leaves out none."""
     flat = stage.flat()
     parts = []
     if "flexure.centre_x" not in flat:
@@ -175,7 +175,7 @@ def _breaks_away(flexure: BothModels) -> list[str]:
 
 
 def _against(evaluation: Evaluation) -> list[str]:
-    """Warn of modes in which the sensor moves opposite to the actuator."""
+    """Warn of modes in which the sensor moves opposite to the actuator; empty without any."""
     modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
     if not modes:
         return []
@@ -188,7 +188,10 @@ def _against(evaluation: Evaluation) -> list[str]:
 
 
 def _differences(flexure: BothModels) -> list[str]:
-    """Say where the two models differ so much that the closed forms do not apply."""
+    """Say where the two models differ so much that the closed forms do not apply.
+
+    The list is empty if they agree, or if the beam model found no solution.
+    """
     if flexure.beams is None:
         return []
     shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}

@@ -182,7 +182,10 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """Draw how much worse the fit becomes as one parameter is varied."""
+    """Draw how much worse the fit becomes as one parameter is varied.
+
+    The list is empty if that was not computed.
+    """
     best = moves.fit.cost
     parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}

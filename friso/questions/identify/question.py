@@ -95,7 +95,10 @@ class IdentifyAnswer(Answer):
         return details(self.result, self.inputs)
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the command that checks the identified stage."""
+        """Return the command that checks the identified stage.
+
+        There is none without a stage file, or if the stage was checked already.
+        """
         if self.result.stage is None or not files or self.checked is not None:
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
@@ -263,7 +266,10 @@ def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """Say which tables the stage file lacks, and that a log or assumed values fill them."""
+    """Say which tables the stage file lacks, and that a log or assumed values fill them.
+
+    `made_up` lists their keys; without any, nothing is said.
+    """
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))

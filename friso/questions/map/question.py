@@ -111,7 +111,10 @@ class SweepAnswer(Answer):
         return texts if self.store is None else [*texts, f"store: {self.store}"]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the command that runs the cell with the largest swing at its end."""
+        """Return the command that runs the cell with the largest swing at its end.
+
+        There is none for a map in memory, without a store.
+        """
         if self.store is None:
             return []
         swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)

@@ -219,7 +219,7 @@ def goal_words(goal: Goal) -> str:
 
 
 def _interrupted(tuning: Advice) -> list[str]:
-    """Say that the search was interrupted and the answer is the best so far."""
+    """Say that the search was interrupted and the answer is the best so far; or say nothing."""
     if not tuning.interrupted:
         return []
     return [
@@ -524,7 +524,10 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone."""
+    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone.
+
+    The text is empty if there is no such setting.
+    """
     others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
     lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
     return (
@@ -533,7 +536,10 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
 
 
 def _edges(tuning: Advice) -> str:
-    """Say at which bandwidth hunting ends, and up to which one there is enough margin."""
+    """Say at which bandwidth hunting ends, and up to which one there is enough margin.
+
+    A bandwidth that is not known is left out; if none is known, the text is empty.
+    """
     edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
     parts = []
     if edge is not None:
@@ -613,7 +619,10 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """Say in which range each number of the least change works, the others as tuned."""
+    """Say in which range each number of the least change works, the others as tuned.
+
+    The list is empty if no change works, or if it varies no number.
+    """
     least = tuning.least
     if least is None or not least.remedy.variables:
         return []

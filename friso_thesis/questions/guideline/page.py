@@ -186,7 +186,7 @@ def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, 
 
 
 def edges_table(guideline: Guideline) -> str:
-    """Return all samples with their groups and edges, as CSV.
+    """Return all samples with their dimensionless groups and edges, as CSV.
 
     Numbers have four digits, more than the accuracy of an edge.
     """

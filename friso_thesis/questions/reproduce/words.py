@@ -52,7 +52,7 @@ def numbers(verdict: ClaimVerdict) -> str:
 
 
 def met(verdict: ClaimVerdict) -> str:
-    """Return how many criteria are met."""
+    """Return how many criteria of a claim are met; "" if the claim was not judged."""
     if verdict.finding is None:
         return ""
     decided = [holds for holds in verdict.finding.pattern if holds is not None]
@@ -60,7 +60,10 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say for how many random choices of the open values a claim holds, with an interval."""
+    """Say for how many random choices of the open values a claim holds, with an interval.
+
+    The text is empty if no such choices were tried.
+    """
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -93,7 +96,7 @@ def criterion_word(part: Part) -> str:
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
-    """Return why a claim does not hold: the first sentence of each reason.
+    """Return why a claim does not hold: the first sentence of each reason; empty without any.
 
     For several criteria, each reason names the criteria to which it belongs. The rest is among the details.
     """
@@ -172,7 +175,7 @@ def open_rows() -> list[Sequence[str]]:
 def fit_sentence(plausible: Plausible) -> str:
     """Say which random choice of the open values fits the numbers printed in the thesis best.
 
-    friso's own choice counts too. The sentence also says which numbers these are.
+    friso's own choice counts too. The sentence also names the numbers compared. It is empty if no choice was compared.
     """
     fit = plausible.fit
     if fit is None:
@@ -194,7 +197,10 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """Return rows of numbers printed in the thesis, beside those of the best open values."""
+    """Return rows of numbers printed in the thesis, beside those of the best open values.
+
+    There are none if no choice of open values was compared.
+    """
     if plausible.fit is None:
         return []
     return [

@@ -81,7 +81,10 @@ class Group:
     part: str = "stage"
 
     def of(self, flat: Mapping[str, Any]) -> Any:
-        """Return the group's value for stages, given by keys [SI] with numbers or arrays."""
+        """Return the value of this dimensionless group for stages.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
         value = self.factor
         for name, power in self.powers.items():
             parameter = PARAMETERS[name]

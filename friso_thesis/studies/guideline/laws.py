@@ -50,8 +50,8 @@ SampleValues = Mapping[str, np.ndarray]
 class Rate:
     """A frequency that enters a law of the edge, in units of sqrt(sigma_0/m).
 
-    It is a factor times groups to the fixed powers of `base`, times further groups over their references to fitted
-    powers. Powers are fitted only for those `candidates` that turn out to matter.
+    It is a factor times dimensionless groups to the fixed powers of `base`, times further groups over their references
+    to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Rate:
     candidates: tuple[str, ...]
 
     def fixed(self, values: SampleValues) -> np.ndarray:
-        """Return the logarithm of the product of groups to fixed powers, shape (count,)."""
+        """Return the logarithm of the product of dimensionless groups to fixed powers, (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
 
@@ -97,7 +97,10 @@ class FittedLaw:
     path: tuple[float, ...] = ()
 
     def of(self, rate: int) -> dict[str, float]:
-        """Return the fitted exponents of one of the law's frequencies, by group."""
+        """Return the fitted exponents of one of the law's frequencies, by dimensionless group.
+
+        `rate` is the index of the frequency.
+        """
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
     def log_rates(self, values: SampleValues) -> np.ndarray:

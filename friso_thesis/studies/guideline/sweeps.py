@@ -62,7 +62,7 @@ LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
 
 @dataclass(frozen=True)
 class Sweep:
-    """Samples, which are stages given by their groups, and their edges of hunting.
+    """Samples, which are stages given by their dimensionless groups, and their edges of hunting.
 
     `values` are the groups, each of shape (count,), and contain the crossover at the edge (in units of sqrt(sigma_0/m),
     NaN without an edge). `locked` (count,) is the edge of the same stage with its joint locked (rigid).
@@ -112,7 +112,7 @@ def _columns(edges: Edges) -> dict[str, np.ndarray]:
 
 
 def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
-    """Return Sobol samples of a box, by group, each of shape (count,)."""
+    """Return Sobol samples in the ranges `box`, by dimensionless group, each of shape (count,)."""
     points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(np.array(list(box.values()))).T
     return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))

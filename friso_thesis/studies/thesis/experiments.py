@@ -217,7 +217,10 @@ class Experiments:
 
 @lru_cache(maxsize=64)
 def _experiment(name: str, stage_file: str) -> Any:
-    """Return an experiment, cached for the judges of several claims."""
+    """Run an experiment by its name on the stage in the text of a stage file.
+
+    The result is cached for the judges of several claims.
+    """
     return _RUNS[name](loads(stage_file))
 
 

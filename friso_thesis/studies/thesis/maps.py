@@ -97,7 +97,7 @@ def trend_text(correlation: float) -> str:
 
 
 def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
-    """Return the size of the largest square of cells that come to rest, over all valid cells."""
+    """Return the fraction of the valid cells in the largest square in which all come to rest."""
     free = valid & ~moving
     side = free.astype(int)  # size of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
@@ -108,7 +108,7 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
 
 
 def overlap(part: np.ndarray, total: np.ndarray) -> float:
-    """Return the fraction of cells of `total` that are also in `part`; NaN for none."""
+    """Return the fraction of cells of `total` that are also in `part`; NaN if `total` has none."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 

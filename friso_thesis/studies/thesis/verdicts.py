@@ -70,7 +70,10 @@ class ClaimVerdict:
 
     @property
     def dependence(self) -> str:
-        """Say for which fraction of random open values a claim holds, and on what that depends."""
+        """Say for which fraction of random open values a claim holds, and on what that depends.
+
+        The text is empty if the claim was not judged.
+        """
         if self.finding is None:
             return ""
         if self.space is None:

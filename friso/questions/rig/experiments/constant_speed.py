@@ -41,7 +41,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _slow(result: ConstantSpeedResult) -> list[str]:
-    """Say what slow sliding shows of friction."""
+    """Say what slow sliding shows of friction; empty if it was not tried."""
     if not result.slow:
         return []
     head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
@@ -117,7 +117,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
-    """Draw the friction in slow sliding at the first place that shows it."""
+    """Draw the friction in slow sliding at the first place that shows it; empty if none does."""
     result: ConstantSpeedResult = outcome.result
     places = [sliding.result for sliding in result.slow if len(sliding.result.model)]
     if not places:

@@ -164,7 +164,10 @@ def _on(moves: HuntingResult) -> str:
 
 
 def _rail(moves: HuntingResult, number: int, before: str) -> str:
-    """Name a rail, if there are several; a stage file without [rail] has a single nameless one."""
+    """Name a rail by its seed, after the text `before`, if there are several; empty otherwise.
+
+    A stage file without [rail] has a single nameless rail.
+    """
     return f"{before} rail {moves.rails[number]:.0f}" if len(moves.rails) > 1 else ""
 
 

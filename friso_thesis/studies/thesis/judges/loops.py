@@ -56,7 +56,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 
 def _beyond(locked: CrossoverLoops) -> str:
-    """Say where the locked loop, tuned to the highest setting, crosses 0 dB again."""
+    """Say where the locked loop, tuned to the highest crossover, crosses 0 dB again."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
@@ -188,7 +188,7 @@ def crossing_nearest(margins: Margins, frequency: float) -> float:
 
 
 def _further(margins: Margins, setting: float) -> tuple[float, ...]:
-    """Return the 0 dB crossings [Hz] above that of the tuned crossover."""
+    """Return the 0 dB crossings [Hz] above the one nearest to the crossover `setting` [Hz]."""
     return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 
@@ -215,7 +215,10 @@ def _sampled(analysis: Linear) -> FindingTable:
 
 
 def _edges(analysis: Linear, setting: float) -> str:
-    """Return the delays at which a setting is at the edge of stability."""
+    """Say at which delays the loop tuned to a crossover [Hz] is at the edge of stability.
+
+    The crossover is `setting`; the delays are those with the joint free and locked.
+    """
     edges = {"free": analysis.free.delay_at[setting], "locked": analysis.locked.delay_at[setting]}
     parts = [
         f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()
