@@ -88,7 +88,10 @@ def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure:
 def figures_of(
     answer: Answer, beside: Callable[[Figure], Figure], some: Callable[[], Sequence[Figure]] | None = None
 ) -> AnswerPart:
-    """Return the figures of an answer without its words; `some` selects a few of them."""
+    """Return the figures of an answer without its words; `some` selects a few of them.
+
+    `beside` adds to each figure what it is compared with.
+    """
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure)) for figure in (some or answer.figures)()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}

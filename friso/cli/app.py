@@ -210,9 +210,9 @@ def _is_of_loading(error: BaseException) -> bool:
 
 
 def _plug_ins() -> str:
-    """Return a line for the help that names what installed packages add; empty if they add nothing.
+    """Return a line for the help that names what installed packages add; empty if nothing.
 
-    It names controllers, friction laws and motions.
+    The line names controllers, friction laws and motions.
     """
     if not any(map(installed_modules, ("friso.controllers", "friso.friction", "friso.motions"))):
         return ""

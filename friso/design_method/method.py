@@ -322,8 +322,9 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
     """Return the front of leaf springs for the largest stroke that allows the machine's limit.
 
-    The limit is one on the crossover. If no stroke allows it, it is the front that allows the highest crossover. The
-    task that the front solves comes first. Raises NoDesign if no leaf springs meet the requirements.
+    The limit is one on the crossover. If no stroke allows it, the front that allows the highest crossover is returned.
+    The task that the front solves comes first. `friction` [N] is the least static friction. Raises NoDesign if no leaf
+    springs meet the requirements.
     """
     settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []

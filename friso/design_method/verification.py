@@ -80,9 +80,9 @@ class MachineOutcomes:
         return share_interval(self.missed, self.tried)
 
     def slower_than(self, share: float) -> float:
-        """Return the settling time [s] that a given fraction of the moves exceeds.
+        """Return the settling time [s] that the fraction `share` of the moves exceeds.
 
-        It is infinite if more moves than that do not settle.
+        The result is infinite if more moves than that do not settle.
         """
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
@@ -167,7 +167,10 @@ def move_machines(
 def _followed_moves(
     flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
-    """Simulate moves, each followed for a time [s] after its last corner."""
+    """Simulate the moves of `count` stages, each followed for a time [s] after its last corner.
+
+    `window` is the position window [m]; `label` names the work to the progress.
+    """
     settings = DesignSettings.current()
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}

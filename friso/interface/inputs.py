@@ -179,7 +179,8 @@ _LONGEST_STEM = 150
 def stem_of(source: StageLike, usual: str = "stage") -> str:
     """Return a stem for names of files about a stage: the name of its file without suffix.
 
-    Bytes that are not text become "_". A long name is cut, so that suffixes still fit.
+    A stage without a file gets the `usual` stem. Bytes that are not text become "_". A long name is cut, so that
+    suffixes still fit.
     """
     if isinstance(source, Stage | Mapping):
         return usual
@@ -226,7 +227,7 @@ def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
     """Check a whole number, and return it.
 
-    Raises InputError unless it lies from `least` to `most`.
+    Raises InputError for the option `name` unless the number lies from `least` to `most`.
     """
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
@@ -237,7 +238,10 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
 
 
 def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
-    """Check that a value is one of `choices`. Raises InputError for anything else."""
+    """Check that a value is one of `choices`, and return it.
+
+    Raises InputError for the option `name` otherwise.
+    """
     if not (isinstance(value, str) and value in choices):
         raise InputError(
             name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example

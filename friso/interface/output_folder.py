@@ -51,7 +51,10 @@ class OutputFolder:
     """The folder that a command writes into; `inputs` are the files that it reads."""
 
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
-        """Check the folder. Raises InputError if the command must not write there, or cannot."""
+        """Check the folder; with `overwrite`, other files and edited texts may be replaced.
+
+        Raises InputError if the command must not write there, or cannot.
+        """
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         refuse_place("--out", folder)
         if self.unfinished.is_symlink():
@@ -202,7 +205,7 @@ def check_file(
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
     """Write a file that the user names, whole or not at all.
 
-    Raises InputError if it must not be written, or cannot.
+    Raises InputError if it cannot be written, or exists already and `overwrite` is not set.
     """
     check_file(option, path, overwrite)
     place = Path(os.path.realpath(path))  # a link stays a link
@@ -223,7 +226,7 @@ def output_folder(
 ) -> OutputFolder | None:
     """Return the folder that a command writes into; None if no `folder` was named.
 
-    Raises InputError if the command must not write there, or cannot.
+    Raises InputError if the command must not write there, even with `overwrite`, or cannot.
     """
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 

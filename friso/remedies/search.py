@@ -216,10 +216,10 @@ class Search:
                 self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
-        """Minimise the cost over the variables of the remedy.
+        """Minimise the settling time, or the quantity `wanted` if given, over a remedy's variables.
 
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
-        evolution, then again in smaller ranges around the best point.
+        evolution, if given from the points `start`, then again in smaller ranges around the best point.
         """
         tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
@@ -438,8 +438,9 @@ class Search:
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
         """Return better settings near a point (variables,), the best first.
 
-        The point was taken because better ones failed: there machines hunted, or too few met the goal. New points are
-        chosen at random around the point, then around the point taken next.
+        The best settle soonest, or have the least `wanted` if given. The point was taken because better ones failed:
+        there machines hunted, or too few met the goal. New points are chosen at random around the point, then around
+        the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()

@@ -163,7 +163,7 @@ class Performance:
     ) -> Performance:
         """Survey the machines with indices `numbers` for hunting, if they meet all else.
 
-        Returns the performance with the results.
+        With `at_once`, all bandwidths are simulated together. Returns the performance with the results.
         """
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:

@@ -83,7 +83,10 @@ def place(member: Members, bode: Bode) -> str:
 
 
 def in_words(cart: str, touched: bool, limited: bool) -> str:
-    """Join what the cart does with the state of the limiter, if the limiter has two states."""
+    """Describe a state: what the cart does, and whether the limiter is `touched` or free.
+
+    The limiter is left out unless it can be both (`limited`).
+    """
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 

@@ -195,7 +195,10 @@ def _why(bode: Bode) -> list[str]:
 
 
 def _limits(bode: Bode, name: str) -> str:
-    """Say over which crossovers the loop is stable, and over which its modulus margin is good."""
+    """Say over which crossovers the loop is stable, and over which its modulus margin is good.
+
+    `name` is the state of the joint.
+    """
     limits = bode.limits[name]
     stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
     calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)

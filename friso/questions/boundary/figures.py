@@ -176,6 +176,6 @@ def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, s
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
-    """Return the axis of a key over its range, widened on both sides by a fraction of the range."""
+    """Return the axis of a key over its range, widened on both sides by the fraction `margin`."""
     low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
     return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

@@ -95,7 +95,10 @@ def _does(verdicts: set[str]) -> str:
 
 
 def _open(verdict: LawVerdict, case: str) -> str:
-    """Say what the stage does under one law with different values of its free parameters."""
+    """Say what the stage does under one law with different values of its free parameters.
+
+    `case` is "given", "locked" or "free", by the state of the joint.
+    """
     trials: dict[str, list[Trial]] = {}
     for trial in verdict.trials:
         does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"

@@ -234,7 +234,9 @@ def checked_stage(
 ) -> CheckAnswer:
     """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
-    Raises InputError for a number of draws that is not usable.
+    `draws` is the number of machines; by default, as many as a fixed work allows. With `laws`, the stage is checked
+    under other friction laws, too. `tolerance` is that of the solver. Raises InputError for a number of draws that is
+    not usable.
     """
     settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)

@@ -177,7 +177,7 @@ def _following(case: Case) -> str:
 
 
 def _too_much(what: str) -> str:
-    """Say that something was not determined because it takes too much work."""
+    """Say that something, named by `what`, was not determined because it takes too much work."""
     return f"{what} was not determined, as that takes more work than a check may"
 
 

@@ -276,7 +276,7 @@ def _too_late(resting: Sequence[OptionResult]) -> str:
 
 
 def _number(result: OptionResult, count: int) -> str:
-    """Write how many of the machines are in position at the end."""
+    """Write how many of the machines (`count`) are in position at the end with an option."""
     return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
 
 

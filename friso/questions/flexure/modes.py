@@ -147,7 +147,7 @@ def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Sha
 
 
 def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    """Return the middle line of a leaf."""
+    """Return the middle line of a leaf at rest and moved; `offset` is the leaf's height z [m]."""
     x, leaf = _smooth(mechanism, leaf)
     return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
 

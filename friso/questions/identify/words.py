@@ -196,7 +196,7 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
-    """Write an experiment in words."""
+    """Write an experiment in words, with the `label` from which its figures are named."""
     view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
     facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
     return ExperimentSummary(

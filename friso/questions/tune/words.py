@@ -339,7 +339,10 @@ def _holds(measured: Performance, goal: Goal) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """Say what a remedy costs beside the stage as it is: force, margin and stiffness."""
+    """Say what a remedy costs beside the stage as it is: force, margin and stiffness.
+
+    If it `buys_joint`, the text adds that standstill was not computed.
+    """
     goal, before = tuning.goal, tuning.present
     force = _against(measured.force(goal), before.force(goal), "force", "N")
     resists = "stiffness against a load before the integral acts"

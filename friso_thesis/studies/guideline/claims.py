@@ -204,7 +204,7 @@ class LeastGap:
         return f"{self.low:.2g} N" if np.isfinite(self.high) else f"more than {self.low:.2g} N, the largest tried,"
 
     def within(self, least: float, most: float) -> bool | None:
-        """Tell whether the gap lies in a range; None if that is unknown."""
+        """Tell whether the gap lies from `least` to `most` [N]; None if that is unknown."""
         if self.high < least or self.low > most:
             return False
         return True if least <= self.low and self.high <= most else None

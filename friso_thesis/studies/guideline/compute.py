@@ -117,7 +117,8 @@ class Guideline:
     def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
         """Return the errors of a law on the held-out samples selected by `which`, shape (count,).
 
-        Returns None if no sample is selected.
+        If `free`, the law is that of the free joint, otherwise that of the locked one. Returns None if no sample is
+        selected.
         """
         held = (self.free if free else self.locked).test.usable
         subset = held.take(which(held))

@@ -102,7 +102,7 @@ class Keep(KeptWork):
     sources = ("../friso_thesis/studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
-        """Return the part with this name, from the folder or else computed now and saved."""
+        """Return the part of a sweep with this name from the folder; otherwise `make` and save it."""
         columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
         return Edges(**columns)
 
@@ -130,7 +130,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 
 
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
-    """Return the edges of samples with a free joint, and of all samples with locked joints.
+    """Return the edges of samples with a free joint, and of all `count` with locked joints.
 
     The first result has only samples with a locked edge, because the frequency of the joint is chosen relative to it.
     """

@@ -208,9 +208,10 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
 
 
 def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
-    """Design a joint whose edge by the law stays below the aim, over the friction range.
+    """Design a joint whose edge by the law stays below `aim` [Hz], over the friction range.
 
-    Its stiffness is nine tenths of the largest possible one, and its stroke the smallest possible.
+    Its stiffness is nine tenths of the largest possible one, and its stroke the smallest possible. `limit` [Hz] is the
+    machine's highest crossover.
     """
     forces = friction_range(DESIGN_GAPS)
     base: dict[str, Any] = plain_rig("joint")

@@ -89,7 +89,7 @@ class InPosition:
     louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
 
     def ratio(self, source: str) -> float:
-        """Return the RMS with the joint free over the RMS with it locked."""
+        """Return the RMS with the joint free over the RMS with it locked, for one `source`."""
         return float(self.runs["free", source].true[0, 0] / self.runs["locked", source].true[0, 0])
 
     @property

@@ -109,7 +109,10 @@ class ClaimVerdict:
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """Write for which fraction of the random choices of open values a claim holds."""
+    """Write for which fraction of the random choices of open values a claim holds.
+
+    `count` is the number for which it holds, of `draws` choices.
+    """
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 

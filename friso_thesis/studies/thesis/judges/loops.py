@@ -127,7 +127,10 @@ def _why_elsewhere(contact: Contact) -> str:
 
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
-    """Judge whether a further crossing of 0 dB takes the loop close to instability."""
+    """Judge whether a further crossing of 0 dB takes the loop close to instability.
+
+    `setting` is the tuned crossover, and `further` are the crossings above it [Hz].
+    """
     close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
