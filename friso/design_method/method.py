@@ -127,7 +127,7 @@ class Design:
 
     @property
     def stage(self) -> Stage:
-        """Return the design as a stage."""
+        """Return the stage with the chosen leaf springs, crossover and gains."""
         return self.fitted.stage
 
     @property

@@ -51,7 +51,7 @@ class MachineOutcomes:
 
     @property
     def completed(self) -> np.ndarray:
-        """Tell which runs were completed, shape (count,)."""
+        """Tell which runs were simulated to their end, shape (count,)."""
         return self.words != FAILED
 
     @property

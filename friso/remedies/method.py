@@ -87,7 +87,7 @@ class Advice:
 
     @property
     def needed(self) -> bool:
-        """Tell whether the present stage fails the goal."""
+        """Tell whether the stage as it is misses the goal, or may miss it."""
         return bool(self.unmet)
 
     @property

@@ -92,7 +92,7 @@ class TriedPoints:
         }
 
     def meets(self, goal: Goal) -> np.ndarray:
-        """Return which points break no constraint."""
+        """Return which settings meet every part of the goal, shape (n,)."""
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
@@ -202,7 +202,7 @@ class Search:
 
     @property
     def _work(self) -> float:
-        """Return the work allowed for a search."""
+        """Return the work allowed for this search, in the units of `Allowance`."""
         settings = RemedySettings.current()
         return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 

@@ -78,7 +78,7 @@ class Performance:
 
     @property
     def median(self) -> float:
-        """Return the median settling time [s]."""
+        """Return the median settling time [s]; infinite if more than half do not settle."""
         return float(np.median(self.moves.settling))
 
     def force(self, goal: Goal) -> float:

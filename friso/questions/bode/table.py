@@ -41,7 +41,7 @@ def _of_loop(item: ShownState, loop: CascadeLoop, name: str) -> str:
 
 
 def decibels(factor: float) -> float:
-    """Convert a factor to decibels [dB]."""
+    """Convert a factor on an amplitude to decibels: 10 is 20 dB."""
     return 20 * math.log10(factor)
 
 

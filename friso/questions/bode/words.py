@@ -34,7 +34,7 @@ TARGET = (
 
 
 def sentences(bode: Bode) -> list[str]:
-    """Return all sentences of the answer in order."""
+    """Return all sentences: stability, how fast the controller may be, and caveats."""
     limits = [crossover_heading(bode), *crossovers(bode).values()]
     return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
 
@@ -229,6 +229,6 @@ def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
 
 
 def tables(bode: Bode) -> list[AnswerTable]:
-    """Return the table of margins in each state."""
+    """Return the table of stability margins, with a column for each state."""
     states = shown_states(bode)
     return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

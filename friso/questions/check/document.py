@@ -152,7 +152,7 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
 
 
 def _margin(edge: Margin) -> dict[str, Any]:
-    """Return the margin of the verdict in bandwidth."""
+    """Return how far the bandwidth is from the edge of hunting, for the document."""
     crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
     return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
 

@@ -75,7 +75,7 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _all(laws: VerdictsByLaw) -> str:
-    """Say how many laws were tried."""
+    """Name all friction laws tried by their number: "both laws that were tried"."""
     count = len(laws.verdicts)
     if count == 1:
         return "the one law that was tried"

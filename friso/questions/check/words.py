@@ -445,7 +445,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
-    """Say to which lower bandwidth the stage settles."""
+    """Say to which lower bandwidth the stage settles, in place of a higher one."""
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
     return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
 

@@ -61,13 +61,13 @@ def label(result: OptionResult) -> str:
 
 
 def in_prose(result: OptionResult) -> str:
-    """Name an option within a sentence."""
+    """Name an option with its letter, to stand within a sentence."""
     kind = result.option.kind
     return f"{kind.prose or f'the {kind.title}'} ({kind.letter})"
 
 
 def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
-    """Return what each option is, by its label."""
+    """Return a row for each option: its label, and its joint and controller in words."""
     return [(label(result), _about(result.option, comparison)) for result in comparison.results]
 
 
@@ -385,7 +385,7 @@ def _resting(comparison: Comparison) -> list[OptionResult]:
 
 
 def population(comparison: Comparison) -> list[str]:
-    """Say how the machines were drawn."""
+    """Say how the machines were drawn: how many, and how far each key spreads."""
     machines = comparison.machines
     lines = [
         f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "

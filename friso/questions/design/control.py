@@ -146,7 +146,7 @@ def _met(design: Design) -> str:
 
 
 def _worst(outcome: MachineOutcomes) -> str:
-    """Describe the worst simulated move."""
+    """Describe the worst simulated move: how far it swings or creeps, or how late it settles."""
     k = outcome.worst
     if outcome.restless[k]:
         return f"The worst move, which {outcome.words[k]} over {trimmed(outcome.swing[k], 'm')}"

@@ -17,7 +17,7 @@ GAP = 1.0
 
 
 def steps(design: Design) -> tuple[DesignStep, ...]:
-    """Return all steps of the method in order."""
+    """Return all steps of the design method in order, each with its result and reasons."""
     return isolator_step(design), joint_step(design), leaves_step(design), controller_step(design), moves_step(design)
 
 
@@ -82,7 +82,7 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
 
 
 def _stroke(design: Design) -> str:
-    """Say why the joint has this stroke."""
+    """Say why the joint has this stroke: as specified, the largest allowed, or what leaves allow."""
     stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is as specified."

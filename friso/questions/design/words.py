@@ -133,7 +133,7 @@ def brings(design: Design) -> str:
 
 
 def leaves(design: Design) -> str:
-    """Describe the leaf springs chosen."""
+    """Describe the leaf springs chosen: number, dimensions and material."""
     return leaf_words(design.fitted.choice.geometry)
 
 
@@ -278,7 +278,7 @@ def seconds(time: float) -> str:
 
 
 def sentences(design: Design | UnfinishedDesign) -> list[str]:
-    """Return the verdicts on the design."""
+    """Return the verdicts on the design; if it is unfinished, what is decided so far."""
     if isinstance(design, UnfinishedDesign):
         return so_far(design)
     return [sentence for _, sentence in headline(design)]

@@ -38,7 +38,7 @@ def megapascals(value: float) -> str:
 
 
 def margin_factor(value: float) -> str:
-    """Write a margin as a factor."""
+    """Write a margin as a factor: "2.5 times"; unknown if it is not finite."""
     return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
 
 

@@ -22,7 +22,7 @@ AGREE = 0.1
 
 
 def sentences(flexure: BothModels) -> list[str]:
-    """Return all sentences in order."""
+    """Return all sentences on the leaf springs: what they can do, warnings, and assumptions."""
     joint, *further = findings(flexure)
     return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
 
@@ -221,7 +221,7 @@ _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
 
 
 def _stroke(evaluation: Evaluation) -> str:
-    """Write the stroke in words."""
+    """Write the stroke with its unit: "a stroke of 1 mm"."""
     return f"a stroke of {with_unit(evaluation.stroke, 'm')}"
 
 

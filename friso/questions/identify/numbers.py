@@ -97,7 +97,7 @@ def with_interval(estimate: Estimate) -> str:
 
 
 def estimates_in_words(estimates: Sequence[Estimate]) -> str:
-    """Write several estimates in a sentence, by name."""
+    """Write several estimates in a sentence, each with its name, value and interval."""
     return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 
 

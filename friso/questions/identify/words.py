@@ -74,7 +74,7 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _headline(identification: Identification) -> list[tuple[str, str]]:
-    """Say what is identified, before doubts are added."""
+    """Say what is identified, with doubts, and what is not; each sentence has a colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not _absent(estimate)]
@@ -124,7 +124,7 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate of bias or of viscous asymmetry may be zero."""
+    """Tell whether an estimate may be zero, and is of a bias or of viscous asymmetry."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
@@ -184,7 +184,7 @@ def _row(estimate: Estimate) -> EstimateRow:
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
-    """Return the experiments in words."""
+    """Return each experiment in words, then the comparison of friction laws if there is one."""
     several = zip(identification.experiments, labels(identification), strict=True)
     experiments = [_summary(experiment, label) for experiment, label in several]
     laws = identification.laws

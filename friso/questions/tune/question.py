@@ -63,7 +63,7 @@ class TuneAnswer(Answer):
 
     @property
     def interrupted(self) -> bool:
-        """Tell whether the search was interrupted."""
+        """Tell whether Ctrl-C ended the search, so that the answer is the best so far."""
         return self.result.interrupted
 
     def details(self) -> Sequence[str]:

@@ -203,7 +203,7 @@ def unknown(tuning: Advice) -> list[str]:
 
 
 def goal_words(goal: Goal) -> str:
-    """Describe the goal in words."""
+    """Describe the goal: accuracy, time, moves, force, margins and bandwidth that are required."""
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
     most, moves = goal.bandwidth_limit, goal.moves
@@ -466,7 +466,7 @@ def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Return the keys whose values differ."""
+    """Return the keys of `before` that have another value in `after`."""
     return [key for key, value in before.items() if not np.array_equal(after[key], value)]
 
 
@@ -702,5 +702,5 @@ def sentences(tuning: Advice) -> list[str]:
 
 
 def tables(tuning: Advice) -> list[AnswerTable]:
-    """Return the table of remedies side by side."""
+    """Return the table in which remedies and the stage as it is stand side by side."""
     return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]

@@ -136,5 +136,5 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def sentences(guideline: Guideline) -> list[str]:
-    """Say how accurate the laws are."""
+    """Say how accurately both laws predict the edge of hunting of held-out stages."""
     return accuracy(guideline)

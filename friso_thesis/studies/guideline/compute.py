@@ -245,7 +245,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 
 
 def _compile() -> None:
-    """Compile all equations that are needed, in parallel."""
+    """Compile the equations of all stages that the guideline needs, in parallel."""
     flats = (plain_rig(), plain_rig("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
     kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 

@@ -134,7 +134,10 @@ def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
-    """Survey what attracts the stages of a map."""
+    """Survey evenly spread cells of a map for anything that attracts their stages.
+
+    Results in `kept` are not computed again.
+    """
     coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
     axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
     flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))

@@ -199,7 +199,7 @@ class Experiments:
 
     @property
     def standstill(self) -> InPosition:
-        """Return the rig at a standstill (Fig. 28)."""
+        """Return the motion of the rig at a standstill under several disturbances (Fig. 28)."""
         return self._result(STANDSTILL)
 
     @property

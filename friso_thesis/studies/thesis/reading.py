@@ -62,7 +62,7 @@ def reading() -> WordReading:
 
 @contextmanager
 def read_as(other: WordReading) -> Iterator[None]:
-    """Judge by another reading within the block."""
+    """Judge claims by the reading `other` of the thesis's words within the block."""
     before = _READ.set(other)
     try:
         yield

@@ -54,7 +54,7 @@ class ThesisStudy:
 
     @property
     def sets(self) -> frozenset[str]:
-        """Return the keys that the study itself sets."""
+        """Return the keys that the study sets itself: its changes, axes and links."""
         return frozenset(span.key for span in self.spans) | frozenset(self.links) | frozenset(self.changes)
 
     @property

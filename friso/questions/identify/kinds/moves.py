@@ -177,7 +177,7 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
 
 
 def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[Figure]:
-    """Draw another log as measured and as simulated."""
+    """Draw another log as measured and as simulated; `number` is that of the log."""
     caption = (
         f"{log.name}: simulated with the values identified from the other logs; relative error of the position "
         f"{percent(simulated.errors.position, 3)}, of the force {percent(simulated.errors.force, 3)}."

@@ -195,7 +195,7 @@ def _numbers(plant: Plant) -> dict[str, Any]:
 
 
 def _loop_numbers(loop: MeasuredLoop) -> dict[str, Any]:
-    """Return the crossovers of a loop."""
+    """Return the tuned crossover and the measured 0 dB crossings [Hz] of an open loop."""
     return {"tuned_hz": loop.tuned, "crossings_hz": [crossing.value for crossing in loop.crossings]}
 
 

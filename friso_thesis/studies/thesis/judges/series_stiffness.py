@@ -67,7 +67,7 @@ def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, P
 
 
 def _written(expression: sp.Basic) -> str:
-    """Return an expression as people write it."""
+    """Write a SymPy expression in a readable form, as text."""
     return str(expression).replace("**", "^").replace("*", " ")
 
 

@@ -182,7 +182,7 @@ _SOLVERS = ("ode23s", "ode15s", "ode45")
 
 
 def _title(name: str) -> str:
-    """Return a run's name in words."""
+    """Write the name of a run, such as "locked_8_hz", with blanks and units."""
     return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")
 
 
