@@ -178,7 +178,7 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict in one word, for the joint locked and free if the stage has one.
 
-    It follows from attractors, as in a map of one or two cells.
+    The verdict follows from attractors, as in a map of one or two cells.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)
@@ -304,8 +304,8 @@ def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield where hunting ends, over one key or in the plane of two keys.
 
-    Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. It stays if there is no
-    edge.
+    Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. If the stage cannot hunt,
+    the map stays, with the reason.
     """
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
@@ -546,7 +546,7 @@ def _lines(
 def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
     """Return the shell command and the line of Python for a question about logs.
 
-    They name the machine shown if it counts as prior knowledge.
+    Both lines name the machine shown if it counts as prior knowledge.
     """
     paths, assigned = _dropped(asked)
     options, of = {name: item for name, item in assigned.items() if item}, "the files dropped here"

@@ -51,7 +51,8 @@ class ChosenLeaves:
     def frequency(self) -> float:
         """Return the frequency [Hz] of the first mode that interferes with control.
 
-        It is the lower one of both models, since either may miss a mode where two modes hide each other.
+        The lower one of both models' frequencies is taken, since either model may miss a mode where two modes hide each
+        other.
         """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))

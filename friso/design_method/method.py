@@ -167,8 +167,8 @@ class Design:
 class UnfinishedDesign:
     """A design without its later steps: leaf springs, stroke and crossover, not tried in moves.
 
-    It was interrupted, or stopped because no isolator is needed; `need` has the result on this. `edges` of hunting with
-    the isolator are None if they were not found yet.
+    The work was interrupted, or stopped because no isolator is needed; `need` has the result on this. `edges` of
+    hunting with the isolator are None if they were not located yet.
     """
 
     spec: Spec
@@ -347,7 +347,8 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     """Return the highest crossover [Hz] that a front of leaf springs allows.
 
-    It is the highest frequency on the front of a first mode that interferes with control, over a factor of safety.
+    On the front, the first mode that interferes with control has a highest frequency. The crossover is that frequency
+    over a factor of safety.
     """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 

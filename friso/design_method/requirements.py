@@ -36,7 +36,7 @@ class LeafTask:
     def load(self) -> float:
         """Return the force along the leaves [N].
 
-        It is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
+        The force is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
         larger.
         """
         masses = self.spec.masses.stage

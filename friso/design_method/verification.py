@@ -97,7 +97,8 @@ class MachineOutcomes:
     def worst(self) -> int:
         """Return the index of the worst move.
 
-        It is the restless move with the largest swing, or else the move that settles last.
+        The worst is the move that swings or creeps over the largest distance. If all come to rest, it is the move that
+        settles last.
         """
         rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
         return int(np.where(self.completed, rank, -np.inf).argmax())

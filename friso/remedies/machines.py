@@ -139,7 +139,7 @@ class Fleet:
         return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the factors on keys of each machine, for the keys that the stage has.
+        """Return the keys of each machine as factors on the stage's, for keys that the stage has.
 
         Both parts of a split mass vary with the whole mass.
         """

@@ -132,7 +132,8 @@ class Advice:
     def recommended(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that are described in full.
 
-        They are the smallest change, and the one that settles soonest or the next larger change.
+        First comes the smallest change. The remedy that settles soonest follows, or the next larger change if the
+        smallest already settles soonest.
         """
         return _recommended(self.working, self.goal)
 
@@ -170,9 +171,10 @@ def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tup
 
 
 def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full.
+    """Choose which working remedies to describe in full; none if no remedy works.
 
-    These are the first, and the one that settles soonest; if that is the first, too, the second follows.
+    These are the first remedy and the one that settles soonest. If the first settles soonest, the second remedy follows
+    instead.
     """
     if not working:
         return ()
@@ -383,7 +385,7 @@ class _Session:
     def _combines(self, remedy: Remedy) -> bool:
         """Tell whether a remedy only combines other remedies that work alone.
 
-        Its variables are then those of at least two of them together.
+        Then its variables are those of at least two other remedies together.
         """
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
@@ -593,7 +595,7 @@ class _Session:
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """Return the settings against friction closest to the goal, each with a varied bandwidth.
 
-    They are tried only if no change of the controller alone works.
+    These remedies are tried only if no change of the controller alone works.
     """
     settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):

@@ -491,7 +491,7 @@ def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the distance of points from the nearest of the others, shape (points,).
 
-    It is the largest difference of a coordinate; infinite without others.
+    The distance is the largest difference of a coordinate; infinite without others.
     """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 

@@ -67,9 +67,9 @@ class EdgeDerivatives:
 class SettlingDerivatives:
     """The settling `time` [s] of the stage's own move, and its derivatives [s/SI], (keys,).
 
-    The time runs from the last corner of the reference until the stage stays `within` [m]. It jumps where a turning
-    point crosses the edge of the band. `jump` is the distance of the nearest turning point from that edge, over the
-    band.
+    The time runs from the last corner of the reference until the stage stays `within` [m]. The time jumps where a
+    turning point crosses the edge of this band. `jump` is the distance of the nearest turning point from that edge,
+    over the band.
     """
 
     within: float
@@ -284,8 +284,8 @@ def _is_smooth(
     """Tell whether the settling time changes smoothly with each key.
 
     The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a little
-    either way, and the new times are compared with what the derivatives `by` predict. They differ if the stage bounces
-    on its limiter so often that neighbouring motions diverge.
+    either way, and the new times are compared with what the derivatives `by` predict. Times and predictions differ if
+    the stage bounces on its limiter so often that neighbouring motions diverge.
     """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])

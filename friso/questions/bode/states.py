@@ -112,7 +112,7 @@ def side(touched: bool) -> str:
 def has_limiter(bode: Bode) -> bool:
     """Tell whether the limiter can be both free and touched.
 
-    It can be only one of both if the joint is locked or has no stroke.
+    If the joint is locked or has no stroke, only one of these states is possible.
     """
     return bool(np.ptp(bode.scan.members.touched.astype(int)))
 

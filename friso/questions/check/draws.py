@@ -101,7 +101,7 @@ def _edge(draws: Draws) -> str:
 def _narrowed(draws: Draws) -> str:
     """Say which key should be measured to narrow the ranges most; "" if this is not known.
 
-    It is the key with which the amplitudes of hunting correlate most.
+    The key is the one with which the amplitudes of hunting correlate most.
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))

@@ -365,9 +365,9 @@ def _present_bandwidth(case: Case) -> float | None:
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
-    """Write a bandwidth that is `factor` times that of the stage.
+    """Write a bandwidth that is `factor` times that of the stage, rounded to some digits.
 
-    It is rounded upward or downward to some digits, or to the nearest number with `up` = None.
+    It is rounded up if `up` is true, down if `up` is false, and to the nearest number if `up` is None.
     """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)

@@ -82,7 +82,7 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
 
 
 def _stroke(design: Design) -> str:
-    """Say why the joint has this stroke: as specified, the largest allowed, or what leaves allow."""
+    """Say why the joint has this stroke: because of the specification or of the leaf springs."""
     stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is as specified."

@@ -160,9 +160,9 @@ def _loaded(evaluation: Evaluation) -> list[str]:
 
 
 def _breaks_away(flexure: BothModels) -> list[str]:
-    """Warn that the cart breaks away inside the stroke.
+    """Warn that the cart breaks away inside the stroke, because the leaves push too hard.
 
-    It does so if the leaves push harder than static friction holds.
+    The list is empty if static friction holds the cart, or is not known.
     """
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:

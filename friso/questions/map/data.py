@@ -41,8 +41,9 @@ NONE = 255  # code for a cell without a category, whose number counts
 def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
     """Return everything that the page's script reads, ready for JSON.
 
-    Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
-    `drawn` holds the runs of all cells. Raises ValueError for runs without axes, or without the metric.
+    Arrays are base64 of little-endian numbers, cell by cell in the order of the axes, the last axis fastest. `drawn`
+    holds the runs of all cells. `rerun` is the command that repeats a run. Raises ValueError for runs without axes, or
+    without the metric.
     """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims

@@ -89,7 +89,7 @@ def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
 def _free(guideline: Guideline) -> Figure:
     """Draw the edge with a free joint of ample stroke over the joint's frequency.
 
-    Both are relative to the edge with the joint locked.
+    Edge and frequency are relative to the edge with the joint locked.
     """
     sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])

@@ -124,8 +124,8 @@ def _first_sentence(text: str) -> str:
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     """Return the texts below a figure or section, by name.
 
-    They are numbers and reasons that are shortened above, numbers by what attracts, draws that decide nothing, and what
-    another grid or tolerance changes.
+    The texts are numbers and reasons that are shortened above, numbers by what attracts the stages, and draws that
+    decide nothing. A last text says what another grid or tolerance changes.
     """
     parts = verdict.finding.stated if verdict.finding else ()
     rows = [

@@ -211,9 +211,10 @@ class LeastGap:
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """Return the smallest friction gap F_s - F_c with which the rig hunts at `CLAIMED_AT`.
+    """Return the smallest friction gap F_s - F_c [N] with which the rig hunts at `CLAIMED_AT`.
 
-    It is given for a static friction [N], and interpolated linearly between the points of the edge, in logarithms.
+    The gap holds for a `static` friction [N]. It is interpolated linearly, in logarithms, between the points of the
+    edge.
     """
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)

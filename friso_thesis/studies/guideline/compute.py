@@ -135,8 +135,8 @@ class Guideline:
 class ByRates:
     """Errors of the locked law on held-out samples whose ratio of rates lies in a range.
 
-    The ratio is the frequency at which the bearing slips over that at which falling friction drives the mass away. It
-    is at least `low` and below `high`. The errors are None without samples.
+    The ratio has the frequency at which the bearing slips over the one at which falling friction drives the mass away.
+    The range goes from `low` to below `high`. The errors are None without samples.
     """
 
     low: float
@@ -159,8 +159,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 def safe_over_friction(locked: Fit) -> float:
     """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    Each range of the ratio of the law's two rates has its own factor. It is the largest of the ranges in which the rig
-    may lie.
+    A factor belongs to each range of the ratio of the law's two rates. The largest factor of all ranges in which the
+    rig may lie is returned.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]

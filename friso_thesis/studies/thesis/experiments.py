@@ -290,7 +290,7 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
 def _lively_rail(moves: MovesOnRails) -> int:
     """Return the number of the first rail with peaks at the lowest crossover, joint locked.
 
-    It is the first rail if there is none.
+    If no rail has any, the result is the first rail.
     """
     return int(np.argmax(moves.locked.counted[0]))
 

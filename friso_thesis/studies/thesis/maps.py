@@ -41,9 +41,10 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """Return, for each column of `moving`, (n, columns), where runs stop moving.
 
-    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is where the
-    `size` of the swings, interpolated in its logarithm, is 1. It is halfway between both if sizes are unknown, lie on
-    one side, or nothing is left of the swing beyond. If the limit is outside the range, it is the end of the range.
+    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is the value
+    at which the `size` of the swings, interpolated in its logarithm, is 1. The limit is halfway between both values if
+    sizes are unknown, lie on one side of 1, or nothing is left of the swing beyond. A limit outside the range becomes
+    the end of the range.
     """
     last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
     after = np.minimum(last + 1, len(values) - 1)

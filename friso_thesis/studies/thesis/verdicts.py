@@ -46,7 +46,7 @@ class ClaimVerdict:
     def judgement(self) -> ClaimJudgement:
         """Return the judgement, at friso's own choice of the open values and at random ones.
 
-        A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
+        A claim "holds" if it holds at friso's choice and in at least half of the draws. It "depends" on the values left
         open if it holds at friso's choice or in some draw, but not so often.
         """
         if self.finding is None:

@@ -149,7 +149,8 @@ def _profile_numbers(profile: Profile) -> dict[str, Any]:
 def _headline(moves: IdentifiedMoves) -> str:
     """List what is identified if the force is not in newtons, as it must be in a stage file.
 
-    Values are then in units of that force; the sentence says how to give its scale. It is empty for a force in newtons.
+    Values are then in units of that force; the sentence says how to give its scale. For a force in newtons, the
+    sentence is empty.
     """
     if moves.force_unit == "N":
         return ""

@@ -160,7 +160,7 @@ def _gap(evidence: Evidence) -> Part:
 def _locked_edge() -> str:
     """Say up to which crossover a cycle of the locked rig attracts, with the abstract's mass.
 
-    It is computed as `friso check` does.
+    The search is that of `friso check`; if it locates no edge, the text says so.
     """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"

@@ -1,6 +1,7 @@
 """Judge Eq. 1 and 2: joint and pre-sliding friction as springs in series.
 
-They are differentiated, and compared with the plant.
+The stiffness of such springs is derived and differentiated. Both formulas are compared with the results, and Eq. 1 with
+the plant.
 """
 
 from __future__ import annotations
