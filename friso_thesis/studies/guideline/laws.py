@@ -88,7 +88,8 @@ class FittedLaw:
     """A law of the edge with its numbers.
 
     `factors` belong to the frequencies (rates) that enter it. `exponents` are those fitted, in the order in which they
-    were chosen. `path` is the cross-validated loss (see `loss`) with no exponent, one, two, and so on.
+    were chosen. `path` has the cross-validated loss, a mean error of the logarithm, with no exponent, one, two, and so
+    on.
     """
 
     law: EdgeLaw
@@ -199,7 +200,7 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
 
 
 def loss(off: np.ndarray) -> float:
-    """Return the size of errors of the logarithm: the rms if they are small.
+    """Return the size of errors `off` of the logarithm: nearly the rms if they are small.
 
     Errors beyond `SCALE` count linearly.
     """
@@ -216,8 +217,8 @@ def _validated(
 ) -> float:
     """Return the cross-validated loss of a law with some exponents `chosen`.
 
-    Each part of the samples, numbered in `folds`, is predicted by the law fitted to the others. `target` are logarithms
-    of edges, and `offset` those of the locked joint.
+    Each part of the samples, numbered in `folds`, is predicted by the law fitted to the other parts. `target` are
+    logarithms of edges, and `offset` are logarithms of edges with the joint locked.
     """
     off = np.empty(len(target))
     for fold in range(FOLDS):
@@ -233,7 +234,7 @@ def _log_coefficients(
 ) -> np.ndarray:
     """Fit a law: return the logarithms of its factors, followed by the exponents `chosen`.
 
-    `target` are logarithms of edges, and `offset` those of the locked joint.
+    `target` are logarithms of edges, and `offset` are logarithms of edges with the joint locked.
     """
     features = _features(law, chosen, values)
     fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])

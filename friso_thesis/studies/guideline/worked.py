@@ -199,8 +199,8 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
     """Design isolators until their computed edges are below the limit, at most `CORRECTED`.
 
     The first is designed by the law, with its edge a safety factor below the limit. As long as computed edges are above
-    the limit, another isolator follows. Its aim is lower by the ratio of limit to edge, or by `BLIND` or more if an
-    edge is unknown, and lower still by `CLOSER`.
+    the limit, another isolator follows. Its aim is lower by the ratio of limit to edge, and by `BLIND` or more if an
+    edge is unknown. A factor `CLOSER` lowers it further.
     """
     designs = [_design(laws, limit, limit / safe)]
     while not designs[-1].does and len(designs) < CORRECTED:

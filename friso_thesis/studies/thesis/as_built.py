@@ -217,8 +217,8 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 class RigLoops:
     """Open loops and masses of the rig, as measured with its real drive.
 
-    `locked` has the loops at several settings of the crossover. `free` is the loop with a free joint at the lowest of
-    them, and `plant` is its plant. With the joint free, the `settings` [Hz], shape (n,), were tried; `stable` is true
+    `locked` has the loops tuned to several crossovers. `free` is the loop with a free joint at the lowest of them, and
+    `plant` is its plant. With the joint free, the crossovers `settings` [Hz], shape (n,), were tried; `stable` is true
     where the loop was.
 
     `apparent` are masses [kg] that the rig seems to have, shape (2, ratios), locked and free. Its motor then gives

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return values of rows and columns [SI], which runs keep moving, and which are valid.
 
-    The latter two are booleans of shape (rows, columns). The criterion for moving is an attribute of the runs: the
-    thesis's count, or the end of the run.
+    The last two results are booleans of shape (rows, columns). The criterion for moving is an attribute of the runs:
+    the thesis's count, or the end of the run.
     """
     moving, outcome = (runs[name].transpose(rows, columns).values for name in ("keeps_moving", "outcome"))
     valid = (outcome != "invalid") & (outcome != FAILED)
@@ -62,7 +62,8 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
 def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """Return for each column of `moving`, (n, columns), below which value no run keeps moving.
 
-    `values` ascend, shape (n,). Limits are interpolated by the `size` of swings (see `ends`).
+    `values` ascend, shape (n,). With the `size` of swings over the least that counts, limits are interpolated;
+    otherwise they lie halfway between two values.
     """
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
@@ -81,9 +82,9 @@ GONE = 1e-3
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation of the pairs that are known.
+    """Return Spearman's rank correlation of the pairs of x and y in which both are known.
 
-    It is NaN for fewer than three pairs, or if one side is constant.
+    The result is NaN for fewer than three pairs, or if x or y is constant.
     """
     defined = ~(np.isnan(x) | np.isnan(y))
     ranks = [rankdata(values[defined]) for values in (x, y)]

@@ -62,8 +62,8 @@ class ClaimVerdict:
     def robust(self) -> bool:
         """Tell whether a claim fails for any plausible choice of what the thesis leaves open.
 
-        It does if it holds in no draw, its fraction is at most `ROBUST` by its interval, and nothing undrawn decides on
-        it.
+        The claim must hold in no draw of the open values, and at most in the fraction `ROBUST` by the 95 % interval. No
+        assumption outside the draws may decide on it.
         """
         fails = self.judgement in ("holds in part", "differs")
         return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
@@ -144,8 +144,8 @@ def verdict(
 ) -> ClaimVerdict:
     """Return the verdict from findings by the thesis's count and by what attracts the stages.
 
-    `others` are findings by another method, by its name. `readings` are findings by another reading of the words. Both
-    are mentioned if other parts of the claim hold there.
+    `others` are findings by another method, by its name. `readings` are findings by another reading of the thesis's
+    words. A finding of either kind is mentioned if other parts of the claim hold by it.
     """
     turned = {
         name: f"with {name} {_change(finding, other)}"

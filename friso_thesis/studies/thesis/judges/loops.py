@@ -116,7 +116,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 
 def _why_elsewhere(contact: Contact) -> str:
-    """Say what it would take to cross 0 dB where the thesis measured it."""
+    """Say which change of the model would make the loop cross 0 dB where the thesis measured it."""
     soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
         "No mode of the locked model lies there. The contact of cart and stage would with k_l of "

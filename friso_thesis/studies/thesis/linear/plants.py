@@ -115,9 +115,9 @@ def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: in
 
 
 def _mass_line(case: LimitCase) -> float:
-    """Return the middle of the mass line [Hz].
+    """Return the frequency [Hz] in the middle of the mass line.
 
-    It lies between the antiresonance of the parasitic mode and lower modes.
+    The mass line lies between lower modes and the antiresonance of the parasitic mode.
     """
     high = max((f for f in case.antiresonances if f < case.parasitic), default=np.nan)
     low = max((f for f in case.resonances if f < high), default=high / 10)
