@@ -100,7 +100,7 @@ def _in_order(
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Yield leaf springs in whole sizes that meet the requirements by closed forms.
 
-    The softest come first. Each comes with the factors by which it breaks the requirements, at most 1.
+    The softest come first. Each geometry comes with the factor by which it uses up every requirement, at most 1.
     """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover

@@ -52,7 +52,7 @@ class Modal:
     def margin(self, crossover: np.ndarray) -> np.ndarray:
         """Return the least modulus margin of all states at each crossover [Hz], shape (n,).
 
-        It is 0 if a state is unstable.
+        The margin is 0 at a crossover at which a state is unstable.
         """
         factors = np.atleast_1d(crossover) / bandwidth(self.flat)
         keys = faster(self.flat, np.repeat(factors, len(self.members)))

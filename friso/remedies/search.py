@@ -484,7 +484,7 @@ def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | Non
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell for each point which of the others is equal to it, shape (points, others)."""
+    """Tell which points are equal to which others, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 

@@ -130,7 +130,8 @@ def sensitivity(
     `within` [m], the deviation that counts as in position, the settling time is differentiated as well.
 
     Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
-    with saltation where the equations switch. Only the part by which keys move the start of a move is by central differences.
+    with saltation where the equations switch. Only the part by which keys move the start of a move is by central
+    differences.
 
     The edge is that of a flip. Its derivatives follow from the multipliers, which are exact derivatives of the flow;
     their own change is taken by central differences. Derivatives of the margin are central differences of the loop at

@@ -201,7 +201,10 @@ def _polyline(lines: list[Array]) -> tuple[Array, Array]:
 
 
 def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the limits of both axes around a drawing, with the usual aspect ratio."""
+    """Return the limits of both axes around a drawing that lies between `low` and `high`, (2,).
+
+    The aspect ratio of the panel is the usual one.
+    """
     width, height = high - low
     middle = (low + high) / 2
     half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2

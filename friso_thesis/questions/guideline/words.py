@@ -51,7 +51,7 @@ def _rates(law: FittedLaw) -> list[str]:
 
 
 def _power(group: str, exponent: float) -> str:
-    """Write a dimensionless group, divided by its reference, to a power: "(.../2)^0.50"."""
+    """Write a dimensionless group, divided by its reference value, to a power, as text."""
     written, reference = GROUPS[group].written, REFERENCE[group]
     base = f"({written})" if reference == 1 else f"({written}/{reference:g})"
     if group == "gap":

@@ -96,7 +96,7 @@ class FindingTable:
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of judging a claim, with a table of numbers if there is one."""
+    """What a judge finds on a claim: its parts, and a table of numbers if there is one."""
 
     parts: tuple[Part, ...]
     table: FindingTable | None = None
