@@ -599,7 +599,7 @@ def _given(stage: Stage) -> str:
 
 
 def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return the cases that differ, with their labels and verdicts."""
+    """Return label and verdict for each state of the joint that the stage can have."""
     return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
 
 

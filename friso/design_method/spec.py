@@ -183,7 +183,7 @@ class SpecMasses(Section):
 
 
 class SpecMoves(Section):
-    """The moves: travel and acceleration, each from its range."""
+    """The moves that the machine has to make: ranges of travel and acceleration."""
 
     travel: Annotated[Interval, Span(Quantity("m", positive, "10 mm"), "1 mm .. 100 mm")]
     acceleration: Annotated[Interval, Span(Quantity("m/s^2", positive, "10 m/s^2"), "10 m/s^2 .. 100 m/s^2")]

@@ -305,7 +305,7 @@ def digests_of(folder: Path) -> Digests:
 
 
 def _is_edited(text: Path, digests: Sequence[str]) -> bool:
-    """Tell whether a text is another than friso wrote; not where it cannot be read."""
+    """Tell whether a text differs from what friso wrote; False if it cannot be read."""
     try:
         return sha256(text.read_bytes()).hexdigest() not in digests
     except OSError:

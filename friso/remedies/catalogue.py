@@ -121,7 +121,11 @@ def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint
 
 
 def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Yield a notch at the parasitic mode, unless the goal's bandwidth is reached without one."""
+    """Yield a remedy with a notch at the parasitic mode, if there is such a mode.
+
+    Nothing is yielded if a faster controller reaches the goal's bandwidth limit without a notch, or if the stage takes
+    no further filter.
+    """
     flat = stage.flat()
     if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return

@@ -1,4 +1,4 @@
-"""Say in words what a check found, for each state of the joint, and the conclusion."""
+"""Say in words what a check found for each state of the joint, and what follows from that."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def leaf_words(geometry: Geometry) -> str:
 
 
 def _verified(design: Design) -> tuple[str, str]:
-    """Say how many simulated moves come to rest, with the colour of the verdict."""
+    """Say how many simulated moves come to rest; return the text and the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
     held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
     if design.needed and not locked.missed:

@@ -112,7 +112,7 @@ def digits(value: float, unit: str) -> str:
 def _scale(estimate: Estimate) -> tuple[float, str]:
     """Return the factor and the prefixed unit in which to write a value.
 
-    Without a value, they suit the range that is possible.
+    If there is no value, factor and unit suit the range that is possible.
     """
     finite = [estimate.low, estimate.high]
     if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale

@@ -157,7 +157,7 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
 
 def coloured_by(study: Study, metric: str) -> str:
-    """Return the variable that colours the map: the metric, or the variable that it is shown as."""
+    """Return the variable that colours the map: the metric, or another that shows it."""
     other = metrics()[metric].shown_as
     return other if other in study.metrics else metric
 

@@ -93,8 +93,8 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
     """Say which crossovers leave enough margin beside parasitic modes, joint locked, then free.
 
-    There is one sentence for each damping ratio of the mode. The last says whether one multiple of the crossover is a
-    rule for all modes.
+    There is one sentence for each state of the joint and damping ratio of the mode. If crossovers differ much between
+    modes, the last sentence says that no multiple of the crossover is a rule for all.
     """
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
     conclusion = "Actuator and sensor are on the same part here."

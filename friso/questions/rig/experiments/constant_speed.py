@@ -1,4 +1,4 @@
-"""Show how much of the dynamic friction constant speed on the rig reveals (thesis, Fig. 21)."""
+"""Show what motion at constant speed on the rig shows of dynamic friction (thesis, Fig. 21)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Say what the experiment shows of friction along the rail and over speed, beside the truth."""
+    """Say what the experiment shows of friction along the rail and over speed.
+
+    True values stand beside the measured ones.
+    """
     result: ConstantSpeedResult = outcome.result
     lines = [f"Joint {case.name}: {case.place.verdict}" for case in result.cases]
     for case in result.cases:

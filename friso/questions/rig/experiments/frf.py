@@ -1,6 +1,6 @@
 """Show frequency responses on the rig.
 
-The results are plants, mass lines, open loops, and the highest stable setting.
+The results are plants, mass lines, open loops, and the highest stable crossover.
 """
 
 from __future__ import annotations
