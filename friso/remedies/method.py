@@ -479,7 +479,7 @@ class _Session:
     def tries_large_moves(self) -> None:
         """Verify settings that serve large moves only, first those that begin at the smallest move.
 
-        If an allowance of work is used up, the others are left out.
+        If an allowance of work is used up, the remaining settings are left out.
         """
         largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
         for place, outcome in enumerate(self.outcomes):
@@ -523,7 +523,8 @@ class _Session:
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
         """Verify settings that a search offers, in turn until some work, and record the outcome.
 
-        If none do, the first outcome is recorded, which is not sure to work. Few are tried, and the work is limited.
+        If no settings work, the first outcome is recorded, which is not sure to work. Few settings are tried, and the
+        work is limited.
         """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None

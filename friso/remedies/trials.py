@@ -125,12 +125,12 @@ class Attraction:
 
     @property
     def clear(self) -> np.ndarray:
-        """Tell which machines do not hunt, as far as simulations show."""
+        """Tell which machines do not hunt, as far as simulations show, shape (points, machines)."""
         return ~self.attracts & self.decided
 
     @property
     def surely_clear(self) -> np.ndarray:
-        """Tell which machines certainly do not hunt."""
+        """Tell which machines certainly do not hunt, shape (points, machines)."""
         return ~self.attracts & self.certain
 
 

@@ -71,7 +71,7 @@ class ShownKey:
         return float(f"{value / self.factor:.15g}")
 
     def text(self, value: float, digits: int = 6) -> str:
-        """Write a value [SI] with its unit."""
+        """Write a value [SI] in the unit shown, to at most `digits` digits."""
         return self._with_unit(f"{self.number(value):.{digits}g}")
 
     def uncertain(self, value: float, error: float) -> str:
@@ -260,10 +260,10 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
-    """Say between which of the values tried a cycle attracts as well.
+    """Say in which ranges between the values tried a cycle attracts as well.
 
     `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
-    errors [SI].
+    errors [SI]. Values that belong to no range are listed by themselves. The list is empty without `turns`.
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]

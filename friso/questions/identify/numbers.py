@@ -71,9 +71,9 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Write an interval, such as "94.84 to 95.72 kg".
+    """Write the interval of an estimate, such as "94.84 to 95.72 kg".
 
-    For a value that the logs do not show, it is the range that they allow.
+    If the logs show no value, the range that they allow is written.
     """
     low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):

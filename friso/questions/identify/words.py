@@ -222,9 +222,9 @@ def _used(logs: Sequence[Source]) -> Facts:
 
 
 def labels(identification: Identification) -> list[str]:
-    """Return a name for every experiment, from which its figures are named.
+    """Return for every experiment a short label, with which the names of its figures begin.
 
-    The name is the kind, with a number if several experiments are of one kind.
+    The label is the kind of experiment, with a number if several are of one kind.
     """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [

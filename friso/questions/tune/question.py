@@ -184,7 +184,10 @@ def _goal(
     only: Changeable | None,
     keep: Changeable | None,
 ) -> Goal:
-    """Build the goal from the options. Raises InputError for values that cannot be used."""
+    """Build the goal from the options, in SI.
+
+    Raises InputError for a value that cannot be used, and if nothing is left to change.
+    """
     for name, part in (("only", only), ("keep", keep)):
         if part is not None:
             choice(part, name, get_args(Changeable), f"{name}=controller")

@@ -158,7 +158,7 @@ def _in_short(tuning: Advice) -> Iterator[str]:
 
 
 def _for_all(tuning: Advice) -> str:
-    """Say that the least change holds for all moves, where another that works does not."""
+    """Say that the least change holds for all moves; empty unless another that works does not."""
     least = tuning.least
     every = least is not None and tuning.for_all_moves(least)
     return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))

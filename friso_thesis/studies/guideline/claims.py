@@ -61,7 +61,7 @@ def judged_claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
 
 
 def _gap(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that hunting needs a friction gap of about 1 N."""
+    """Judge the claim that hunting needs a friction gap F_s - F_c of about 1 N."""
     cases = worked.studies["gap"]
     forces = sorted({case.changes["friction.static"] for case in cases})
     gaps = [least_gap(cases, force) for force in forces]
@@ -77,7 +77,7 @@ def _gap(worked: Worked) -> GuidelineClaim:
 
 
 def _share_below_limit(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that the mass ratio does not affect the isolator."""
+    """Judge the claim that the ratio of cart and stage mass does not affect the isolator."""
     cases = worked.studies["share"]
     edges = _computed(cases)
     at = [STUDIED["share"](case.changes) for case in cases]
@@ -95,7 +95,7 @@ def _share_below_limit(worked: Worked) -> GuidelineClaim:
 
 
 def _mass(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that more mass helps."""
+    """Judge the claim that more mass ends hunting at a lower crossover."""
     cases = worked.studies["mass"]
     edges = _computed(cases)
     at = [STUDIED["mass"](case.changes) for case in cases]
@@ -116,7 +116,7 @@ def _stiffness(worked: Worked) -> GuidelineClaim:
 
 
 def _stroke(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that a small stroke is enough, and that longer ones change nothing."""
+    """Judge the claim that a small stroke is enough, and that a longer one changes nothing."""
     cases = {round(1e3 * STUDIED["stroke"](case.changes), 6): case for case in worked.studies["stroke"]}
     words = ", ".join(f"{_edge(case)} at {stroke:g} mm" for stroke, case in cases.items())
     short, long, longest = (cases[stroke].ranked for stroke in STROKES)

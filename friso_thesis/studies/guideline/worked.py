@@ -147,9 +147,9 @@ def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
 
 
 def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
-    """Work through the steps with given laws.
+    """Work through the steps from a crossover limit to an isolator, with the laws given.
 
-    Crossovers are kept above the laws by the safety factors.
+    Crossovers are kept above the laws' edges by the safety factors `safe_locked` and `safe_free`.
     """
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
