@@ -380,7 +380,7 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key that sets the bandwidth if it is not a crossover; None if it is one."""
+    """Return the key that sets the bandwidth; None if it is a crossover or does not exist."""
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 

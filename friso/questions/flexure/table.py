@@ -28,7 +28,7 @@ def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
 
 
 def newtons_per(value: float, length: str) -> str:
-    """Write a stiffness [N/m] per "mm" or "µm", as is usual for drives and for supports."""
+    """Write a stiffness [N/m] per `length`: "mm" for drives or "µm" for supports, as is usual."""
     return f"{_plain(value / {'mm': 1e3, 'µm': 1e6}[length])} N/{length}"
 
 

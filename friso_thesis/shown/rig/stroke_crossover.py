@@ -77,7 +77,7 @@ def rails_panel(counts: StrokeCrossover) -> Panel:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """Return all results for the JSON document.
 
-    Arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers).
+    Arrays have the shape (strokes, crossovers, rails), and fractions of rails (strokes, crossovers).
     """
     counts: StrokeCrossover = outcome.result
     shares = [

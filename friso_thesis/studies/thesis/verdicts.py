@@ -103,7 +103,10 @@ class ClaimVerdict:
         return ", ".join(item.value for item in self.space.hangs_on) if self.space else ""
 
     def _word_of(self, finding: Finding) -> str:
-        """Return the judgement by another meaning of a word: its name, or "still" and the own one."""
+        """Return how a finding by another meaning of a word judges the claim.
+
+        If that is how the claim is judged anyway, "still" is put before it.
+        """
         own = self.finding.judgement if self.finding else ""
         return finding.judgement if finding.judgement != own else f"still {own}"
 
@@ -161,7 +164,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Say how the claim is judged by the second finding, with numbers of parts that differ."""
+    """Say how a second finding judges the claim, with the number in each part that it turns."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

@@ -181,7 +181,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 
 
 def _numbers(plant: Plant) -> dict[str, Any]:
-    """Return the plant with the joint in one state."""
+    """Return the plant with the joint in one state, for the JSON document."""
     averaged: FrequencyResponse = plant.averaged
     return {
         "mass_kg": plant.mass.value,

@@ -134,7 +134,7 @@ OTHER_SOLVERS = "thesis.other-solvers"
 
 @judges("S323C", figure="Sec. 3.2.3, other solvers")
 def other_solvers(evidence: Evidence) -> Finding:
-    """Compare the solvers that the thesis weighs, on the locked and on the free rig."""
+    """Compare the solvers that the thesis considers, on the locked and on the free rig."""
     return judged_solvers(findings_on_file()[OTHER_SOLVERS].values)
 
 
