@@ -60,7 +60,7 @@ def _written_out(match: re.Match[str]) -> str:
 
 
 def _escape_record(record: logging.LogRecord) -> bool:
-    """Escape the message of a log record; keep the record."""
+    """Escape the message of a log record; return True, so that the record is logged."""
     record.msg, record.args = escaped(record.getMessage()), None
     return True
 

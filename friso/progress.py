@@ -44,7 +44,7 @@ def share_of(progress: Progress, number: int, count: int) -> Progress:
 
 
 def between(progress: Progress, first: float, last: float, label: str = "") -> Progress:
-    """Return the progress of a piece of work between two fractions, 0 to 1, of all work.
+    """Return the progress of a piece of work from `first` to `last`, fractions of all work.
 
     A `label` replaces the labels of the piece.
     """

@@ -33,7 +33,10 @@ ROUNDING = 1e-9
 
 
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
-    """Write a fraction in percent to some digits; a dash for none, 0 for mere rounding."""
+    """Write a fraction in percent to some digits; a dash if it is NaN or infinite.
+
+    A fraction as small as rounding errors is 0. With `signed`, positive fractions get a plus.
+    """
     if not math.isfinite(share):
         return NOTHING
     share = share if abs(share) > ROUNDING else 0.0
@@ -50,7 +53,10 @@ def plain_factor(factor: float) -> str:
 
 
 def outwards(value: float, larger: bool) -> float:
-    """Round a value to three digits, never towards the tighter side."""
+    """Round a positive value to three digits: up if `larger`, otherwise down.
+
+    Other values stay as they are.
+    """
     if value <= 0:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
@@ -59,7 +65,10 @@ def outwards(value: float, larger: bool) -> float:
 
 
 def as_toml(value: Any) -> str:
-    """Return a scalar as it is written in TOML; other values are named instead."""
+    """Return a text, boolean or number as it is written in TOML, for messages.
+
+    Other values are described in words, such as "a table".
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -78,7 +87,7 @@ def exactly(value: float, unit: str) -> str:
 
 
 def quoted(value: Any, hint: str = "") -> str:
-    """Write a given value for an error message, short and printable, and what is wrong with it."""
+    """Write a value for an error message, short and printable, with a `hint` in brackets."""
     text = as_toml(value).encode(errors="backslashreplace").decode()
     text = text if len(text) <= 60 else f"{text[:57]}..."
     return f"{text} ({hint})" if hint else text
@@ -136,11 +145,11 @@ class Motor(NamedTuple):
 
 @dataclass(frozen=True)
 class Quantity:
-    """A key that takes number and unit: `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`.
+    """A key that takes number and unit, as an annotation declares it.
 
-    `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are
-    declared as on a linear axis; `on` gives them as on another, named in `axis`. Where `motor` is known, a force may
-    be written in amperes.
+    An example is `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`. `unit` is the SI unit of the
+    values. If it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are declared as on a linear axis; `on`
+    converts them to another, which `axis` names. If `motor` is known, a force may be written in amperes.
     """
 
     unit: str
@@ -184,7 +193,10 @@ class Quantity:
             raise InputError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
     def read(self, entry: Any) -> Value:
-        """Return the SI value of a text, or of the text of a Value. Raises InputError."""
+        """Return the SI value of a text, or of the text of a Value.
+
+        Raises InputError for anything but a number with a suitable unit within the bound.
+        """
         text = getattr(entry, "text", entry)
         try:
             value = _read(text, self.unit, self.motor)
@@ -225,7 +237,10 @@ class Number:
         return self.example
 
     def read(self, entry: Any) -> float:
-        """Return the given number, checked. Raises InputError."""
+        """Return a bare number that the key allows.
+
+        Raises InputError for any other value.
+        """
         is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
         if not is_number or not self.bound.holds(entry):
             beyond = is_number and LARGEST < abs(entry) < math.inf
@@ -249,7 +264,11 @@ _LONGEST = 100
 
 
 def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
-    """Return number times factor in exact arithmetic: "30 ms" gives the float 0.03. Raises _Refused."""
+    """Return the SI value of a text in exact arithmetic: "30 ms" gives the float 0.03.
+
+    Raises _Refused for anything but a number with a unit of the kind of `si_unit`, and for a number beyond all
+    machines.
+    """
     if isinstance(entry, int | float) and not isinstance(entry, bool):
         raise _Refused("a bare number without a unit")
     if not isinstance(entry, str):
@@ -268,7 +287,10 @@ def _read(entry: Any, si_unit: str, motor: Motor | None) -> Value:
 
 
 def _split(entry: str) -> tuple[str, str]:
-    """Return number and unit of a text. Raises _Refused."""
+    """Return number and unit of a text.
+
+    Raises _Refused for a text without either, or too long a text.
+    """
     text = " ".join(entry.split())
     if len(text) > _LONGEST:
         raise _Refused("too long")
@@ -328,7 +350,7 @@ def _checked_unit(text: str) -> str:
 def si_value(text: str) -> float:
     """Return the SI value of a number with any unit, such as "2.4 N/mm".
 
-    The unit is made of common ones, with * between factors. Raises InputError.
+    The unit is made of common ones, with * between factors. Raises InputError for any other text.
     """
     try:
         number, unit = _split(text)
@@ -368,7 +390,7 @@ def _registry() -> Any:
 def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
     """Return the factor to pint's root units, their powers, and the names in the unit.
 
-    Raises _Refused.
+    Raises _Refused for an unknown unit.
     """
     return common_units().get(unit) or by_pint(unit)
 
@@ -376,7 +398,7 @@ def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
 def by_pint(unit: str) -> tuple[float, dict[str, float], list[str]]:
     """Return pint's factor to its root units, their powers, and the names in a unit.
 
-    Raises _Refused.
+    Raises _Refused for an unknown unit.
     """
     try:
         units = _registry().parse_units(unit)
@@ -399,9 +421,9 @@ def _meant(unit: str) -> str:
 
 @lru_cache(maxsize=1024)
 def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
-    """Return the SI value of 1 `unit`; a `motor` may convert amperes.
+    """Return how many `si_unit` make 1 `unit`; a `motor` may convert amperes.
 
-    Raises _Refused if it is of another kind.
+    Raises _Refused if `unit` is unknown or of another kind.
     """
     factor, root, names = _root(unit)
     if si_unit == "Hz":

@@ -40,7 +40,7 @@ class Registry(Generic[Item]):
 
     @property
     def installed(self) -> Mapping[str, str]:
-        """Return the modules of installed packages by name."""
+        """Return the modules of installed packages by name; empty for a registry without a `group`."""
         return installed_modules(self.group, frozenset(self._own)) if self.group else {}
 
     @property

@@ -52,7 +52,7 @@ class SettingRow:
 
 
 class Settings:
-    """Base of the settings of a room: a frozen dataclass whose fields are declared with `setting`."""
+    """Base of the settings of a package: a frozen dataclass whose fields use `setting`."""
 
     _in_use: ClassVar[ContextVar[Any]]
 

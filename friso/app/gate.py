@@ -105,7 +105,7 @@ class Access:
         return host.lower() in self.hosts
 
     def is_origin(self, origin: str | None) -> bool:
-        """Tell whether a request comes from a page of this server, or from no page."""
+        """Tell whether a request comes from a page of this server, or from no page (None)."""
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def session_of(self, token: str, key: str = "") -> str:

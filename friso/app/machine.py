@@ -70,7 +70,10 @@ class Machine:
 
     @property
     def stage(self) -> Stage:
-        """Build the stage, with all changes. Raises StageError."""
+        """Build the stage, with all changes.
+
+        Raises StageError if they do not make a valid stage.
+        """
         return _stage(self)
 
 

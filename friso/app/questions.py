@@ -88,7 +88,10 @@ def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure:
 def figures_of(
     answer: Answer, beside: Callable[[Figure], Figure], some: Callable[[], Sequence[Figure]] | None = None
 ) -> AnswerPart:
-    """Return the figures of an answer without its words; `some` selects a few of them."""
+    """Return the figures of an answer without its words; `some` selects a few of them.
+
+    `beside` adds to each figure what it is compared with.
+    """
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure)) for figure in (some or answer.figures)()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
@@ -175,7 +178,7 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield the verdict in one word, for the joint locked and free if the stage has one.
 
-    It follows from attractors, as in a map of one or two cells.
+    The verdict follows from attractors, as in a map of one or two cells.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)
@@ -301,8 +304,8 @@ def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Yield where hunting ends, over one key or in the plane of two keys.
 
-    Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. It stays if there is no
-    edge.
+    Following the edge may take minutes, so in a plane a coarse map of verdicts comes first. If the stage cannot hunt,
+    the map stays, with the reason.
     """
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
@@ -543,7 +546,7 @@ def _lines(
 def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
     """Return the shell command and the line of Python for a question about logs.
 
-    They name the machine shown if it counts as prior knowledge.
+    Both lines name the machine shown if it counts as prior knowledge.
     """
     paths, assigned = _dropped(asked)
     options, of = {name: item for name, item in assigned.items() if item}, "the files dropped here"
@@ -596,7 +599,7 @@ def _given(stage: Stage) -> str:
 
 
 def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
-    """Return the cases that differ, with their labels and verdicts."""
+    """Return label and verdict for each state of the joint that the stage can have."""
     return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
 
 

@@ -42,8 +42,8 @@ TRIES = 20
 def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
     """Print the address of the page and serve it until interrupted.
 
-    Raises InputError for a stage file that cannot be read, or if no port is free. A host that others can reach is
-    refused unless `insecure` is set.
+    With `browser`, the address is also opened. Raises InputError for a stage file that cannot be read, or if no port is
+    free. A host that others can reach is refused unless `insecure` is set.
     """
     file = example("thesis_rig") if stage is None else stage
     load(file)
@@ -137,9 +137,9 @@ class Server(uvicorn.Server):
 
 
 def listening(host: str, port: int | None) -> socket.socket:
-    """Return a socket that listens at a free port.
+    """Return a socket that listens at a free port of the host.
 
-    It is the port asked for; without one, the first free port from the usual one on. Raises InputError if none is
+    The port is the one asked for; without one, the first free port from the usual one on. Raises InputError if none is
     free.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -210,7 +210,10 @@ def _is_of_loading(error: BaseException) -> bool:
 
 
 def _plug_ins() -> str:
-    """Return a line for the help that names controllers and friction laws of installed packages."""
+    """Return a line for the help that names what installed packages add; empty if nothing.
+
+    The line names controllers, friction laws and motions.
+    """
     if not any(map(installed_modules, ("friso.controllers", "friso.friction", "friso.motions"))):
         return ""
     from friso.stage.foreign import installed

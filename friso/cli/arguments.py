@@ -48,7 +48,10 @@ def with_checked_paths(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def _named(function: Callable[..., None], name: str) -> tuple[str, str]:
-    """Return the name of a path's option on the command line, and an example of its use."""
+    """Return the name of a path's option on the command line, and an example of its use.
+
+    `function` is the command, and `name` the option's name in Python.
+    """
     (info,) = get_type_hints(function, include_extras=True)[name].__metadata__
     if isinstance(info, ArgumentInfo):
         return str(info.metavar), "rig.toml"

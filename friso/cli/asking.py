@@ -89,7 +89,8 @@ def show(
 ) -> None:
     """Print an answer with its `files`, or with the reason why they are `unwritten`.
 
-    Raises typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
+    The answer is printed as JSON with `as_json`, and with its details if `details` is set. Raises typer.Exit with the
+    status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
     """
     written = [*files]
     if as_json:

@@ -47,7 +47,7 @@ class Command:
     def __post_init__(self) -> None:
         """Check that typer can read the function's options, and that the topic exists.
 
-        Raises ValueError.
+        Raises ValueError for an unknown topic. Raises TypeError or NameError for a function that typer cannot read.
         """
         signature(self.function, eval_str=True)
         if self.topic not in TOPICS:

@@ -61,10 +61,7 @@ def ask_by_values(question: Question, values: Mapping[str, Any]) -> None:
 
 
 def command_help(question: Question) -> str:
-    """Return the help of a command.
-
-    It is the docstring of the function up to its parameters, followed by the examples.
-    """
+    """Return the help of a command: its function's docstring without parameters, then examples."""
     before, _, _ = (getdoc(question.function) or "").partition("\n\nParameters\n---")
     first, *more = question.example.splitlines()
     return "\n\n".join([before, f"Example: friso {first}", *more])

@@ -122,14 +122,14 @@ def _display(to_go: Callable[[], str]) -> Display:
     from rich.text import Text
 
     class Rate(ProgressColumn):
-        """The column with the steps per second."""
+        """The column of the progress bar with the steps per second."""
 
         def render(self, task: Task) -> Text:
             """Write the steps per second, if there is one or more."""
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     class ToGo(ProgressColumn):
-        """The column with the estimated time left."""
+        """The column of the progress bar with the estimated time left."""
 
         def render(self, task: Task) -> Text:
             """Write the time left."""

@@ -51,7 +51,8 @@ class ChosenLeaves:
     def frequency(self) -> float:
         """Return the frequency [Hz] of the first mode that interferes with control.
 
-        It is the lower one of both models, since either may miss a mode where two modes hide each other.
+        The lower one of both models' frequencies is taken, since either model may miss a mode where two modes hide each
+        other.
         """
         mode = self.beams.interfering
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
@@ -99,7 +100,7 @@ def _in_order(
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Yield leaf springs in whole sizes that meet the requirements by closed forms.
 
-    The softest come first. Each comes with the factors by which it breaks the requirements, at most 1.
+    The softest come first. Each geometry comes with the factor by which it uses up every requirement, at most 1.
     """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover
@@ -116,7 +117,10 @@ def _in_order(
 
 
 def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
-    """Evaluate a geometry by the beam model. Raises BeamFailure."""
+    """Evaluate a geometry by the beam model.
+
+    Raises BeamFailure if the model finds no solution.
+    """
     return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
 
 

@@ -46,8 +46,8 @@ class DesignedController:
     """Gains by van Dijk's rules at the chosen `crossover` [Hz].
 
     `margin` is the least modulus margin as designed, over the limit cases and all states stuck under a bias force.
-    `corners` is that of each corner of friction and masses, shape (n,). `damping` shows what more damping of the joint
-    would add.
+    `corners` has the least margin at each corner of friction and masses, shape (n,). `damping` shows what more damping
+    of the joint would add.
     """
 
     crossover: float
@@ -58,7 +58,7 @@ class DesignedController:
 
 
 def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
-    """Return the highest crossover [Hz] in the ranges that is not above `highest`."""
+    """Return the highest crossover [Hz] in the `ranges` up to `highest`; None if all lie above."""
     below = [min(high, highest) for low, high in ranges if low < highest]
     return max(below) if below else None
 

@@ -43,7 +43,7 @@ class Corners:
     def highest(self) -> float:
         """Return the highest crossover [Hz] at which any corner hunts.
 
-        It is never below the beginning of the search.
+        If none hunts, the result is the lowest crossover searched.
         """
         return float(max(self.searched[0], self.edges.max()))
 

@@ -103,7 +103,8 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     """Return the leaf springs that meet the requirements with the largest reserve, or None.
 
-    They are logarithms of their sizes and the index of their sheet, shape (4,). Differential evolution finds them.
+    The result has the logarithms of their sizes and the index of their sheet, shape (4,). Differential evolution
+    searches for them.
     """
     settings = DesignSettings.current()
     bought = sheets(task.spec)

@@ -127,7 +127,7 @@ class Design:
 
     @property
     def stage(self) -> Stage:
-        """Return the design as a stage."""
+        """Return the stage with the chosen leaf springs, crossover and gains."""
         return self.fitted.stage
 
     @property
@@ -167,8 +167,8 @@ class Design:
 class UnfinishedDesign:
     """A design without its later steps: leaf springs, stroke and crossover, not tried in moves.
 
-    It was interrupted, or stopped because no isolator is needed; `need` has the result on this. `edges` of hunting with
-    the isolator are None if they were not found yet.
+    The work was interrupted, or stopped because no isolator is needed; `need` has the result on this. `edges` of
+    hunting with the isolator are None if they were not located yet.
     """
 
     spec: Spec
@@ -322,8 +322,9 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTask, list[Candidate]]:
     """Return the front of leaf springs for the largest stroke that allows the machine's limit.
 
-    The limit is one on the crossover. If no stroke allows it, it is the front that allows the highest crossover. The
-    task that the front solves comes first. Raises NoDesign if no leaf springs meet the requirements.
+    The limit is one on the crossover. If no stroke allows it, the front that allows the highest crossover is returned.
+    The task that the front solves comes first. `friction` [N] is the least static friction. Raises NoDesign if no leaf
+    springs meet the requirements.
     """
     settings = DesignSettings.current()
     stroke, choices = spec.leaves.stroke, []
@@ -346,7 +347,8 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float) -> tuple[LeafTa
 def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     """Return the highest crossover [Hz] that a front of leaf springs allows.
 
-    It is the highest frequency on the front of a first mode that interferes with control, over a factor of safety.
+    On the front, the first mode that interferes with control has a highest frequency. The crossover is that frequency
+    over a factor of safety.
     """
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 

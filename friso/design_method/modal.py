@@ -52,7 +52,7 @@ class Modal:
     def margin(self, crossover: np.ndarray) -> np.ndarray:
         """Return the least modulus margin of all states at each crossover [Hz], shape (n,).
 
-        It is 0 if a state is unstable.
+        The margin is 0 at a crossover at which a state is unstable.
         """
         factors = np.atleast_1d(crossover) / bandwidth(self.flat)
         keys = faster(self.flat, np.repeat(factors, len(self.members)))
@@ -85,9 +85,9 @@ def _turns(ratio: np.ndarray) -> np.ndarray:
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """Return the contribution of all modes but the drive mode to the plant [m/N].
+    """Return what the leaf springs' modes add to the plant [m/N], shape (frequencies,).
 
-    `omega` are frequencies [rad/s]; the result has shape (frequencies,).
+    The first mode, the motion in the drive direction, is left out. `omega` are frequencies [rad/s].
     """
     zeta = float(leaves.mechanism.damping_ratio)
     parts = [

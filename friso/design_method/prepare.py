@@ -71,8 +71,8 @@ def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
 def by_rules(stage: Stage) -> Stage:
     """Return the stage with a controller by van Dijk's rules.
 
-    A controller that follows these rules is kept. Otherwise the new one has equal bandwidth for the whole mass, and
-    equal force limit.
+    A controller that follows these rules is kept. Otherwise a new one takes its place, with the same bandwidth for the
+    whole mass and the same force limit.
     """
     if CROSSOVER in stage.flat():
         return stage

@@ -45,7 +45,10 @@ def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
 
 
 def _change(relaxation: Relaxation) -> float:
-    """Return how far a requirement is relaxed, as the logarithm of the factor on its value."""
+    """Return how far a requirement is relaxed, as the logarithm of the factor on its value.
+
+    The result is infinite if the value has to become 0.
+    """
     return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 

@@ -36,7 +36,7 @@ class LeafTask:
     def load(self) -> float:
         """Return the force along the leaves [N].
 
-        It is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
+        The force is the specification's load plus the weight of the heaviest stage, or the stage file's load if that is
         larger.
         """
         masses = self.spec.masses.stage
@@ -71,12 +71,18 @@ class Requirement:
 
 
 def more(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that must become larger to relax a requirement, by the factor it is broken."""
+    """Return a key that relaxes a requirement by becoming larger.
+
+    The key's value is multiplied by the factor by which leaf springs break the requirement.
+    """
     return RelaxableKey(key, value, unit, lambda excess: value * excess)
 
 
 def less(key: str, value: float, unit: str) -> RelaxableKey:
-    """Return a key that must become smaller to relax a requirement, by the factor it is broken."""
+    """Return a key that relaxes a requirement by becoming smaller.
+
+    The key's value is divided by the factor by which leaf springs break the requirement.
+    """
     return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 

@@ -54,14 +54,20 @@ class OneOrMany:
         return self.example
 
     def read(self, entry: Any) -> tuple[Any, ...]:
-        """Read one item or a list. Raises SpecError."""
+        """Read one item or a list of items.
+
+        Raises SpecError for an empty list, and for an item that is not usable.
+        """
         items = entry if isinstance(entry, list | tuple) else [entry]
         if not items:
             raise SpecError("", "an empty list", self.expected, self.example)
         return tuple(self._item(item) for item in items)
 
     def _item(self, value: Any) -> Any:
-        """Read one item, or a material by name. Raises SpecError."""
+        """Read one item, or the name of a material.
+
+        Raises SpecError for a value that is not usable, or an unknown material.
+        """
         if self.of:
             try:
                 return self.of.read(value)
@@ -84,7 +90,10 @@ class Gauges(OneOrMany):
     """A key for a list of thicknesses, or a range, which stands for its usual gauges."""
 
     def read(self, entry: Any) -> tuple[Any, ...]:
-        """Read the thicknesses. Raises SpecError."""
+        """Read thicknesses; a range stands for the usual gauges in it.
+
+        Raises SpecError for an unusable thickness, or a range without a usual gauge.
+        """
         if not (isinstance(entry, str) and ".." in entry):
             return super().read(entry)
         assert isinstance(self.of, Quantity)
@@ -129,7 +138,7 @@ class SpecMachine(Section):
 
     @model_validator(mode="after")
     def _has_one(self) -> Self:
-        """Check that either crossover limit or parasitic frequencies are given. Raises SpecError."""
+        """Raise SpecError unless just one of crossover limit and parasitic frequencies is given."""
         if (self.crossover_limit is None) == (self.parasitic_frequencies is None):
             text = "both" if self.crossover_limit else "neither"
             example = 'crossover_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
@@ -154,7 +163,10 @@ class SpecFriction(Section):
 
     @model_validator(mode="after")
     def _is_not_contradictory(self) -> Self:
-        """Check that Coulomb friction, static friction and gap agree. Raises SpecError."""
+        """Check that Coulomb friction, static friction and gap agree.
+
+        Raises SpecError for Coulomb friction beside a gap, or above the static friction.
+        """
         if self.coulomb and self.gap:
             raise SpecError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
         if self.static and self.coulomb and self.coulomb.high > self.static.high:
@@ -171,7 +183,7 @@ class SpecMasses(Section):
 
 
 class SpecMoves(Section):
-    """The moves: travel and acceleration, each from its range."""
+    """The moves that the machine has to make: ranges of travel and acceleration."""
 
     travel: Annotated[Interval, Span(Quantity("m", positive, "10 mm"), "1 mm .. 100 mm")]
     acceleration: Annotated[Interval, Span(Quantity("m/s^2", positive, "10 m/s^2"), "10 m/s^2 .. 100 m/s^2")]
@@ -230,7 +242,10 @@ class SpecLeaves(Section):
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
-        """Check that stroke, sizes and thicknesses fit each other. Raises SpecError."""
+        """Check that stroke, sizes and thicknesses fit each other.
+
+        Raises SpecError for a stroke of more than half the length, and for sheets thicker than a size or the spacing.
+        """
         thickest = max(self.thickness)
         if 2 * self.stroke.low > self.length.high:
             text = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
@@ -311,7 +326,10 @@ EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 
 def read_spec(text: str) -> Spec:
-    """Read a specification from a TOML text. Raises SpecError."""
+    """Read a specification from a TOML text.
+
+    Raises SpecError for a text that is not TOML or no valid specification.
+    """
     try:
         return Spec(**parsed(text, EXPECTED, EXAMPLE))
     except InputError as error:
@@ -319,7 +337,10 @@ def read_spec(text: str) -> Spec:
 
 
 def load_spec(path: str | os.PathLike[str]) -> Spec:
-    """Read a specification from a TOML file. Raises SpecError."""
+    """Read a specification from a TOML file.
+
+    Raises SpecError for a file that cannot be read or is no valid specification.
+    """
     try:
         tables = parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE)
         if "machine" not in tables and {"controller", "motion"} <= tables.keys():

@@ -51,7 +51,7 @@ class MachineOutcomes:
 
     @property
     def completed(self) -> np.ndarray:
-        """Tell which runs were completed, shape (count,)."""
+        """Tell which runs were simulated to their end, shape (count,)."""
         return self.words != FAILED
 
     @property
@@ -80,9 +80,9 @@ class MachineOutcomes:
         return share_interval(self.missed, self.tried)
 
     def slower_than(self, share: float) -> float:
-        """Return the settling time [s] that a given fraction of the moves exceeds.
+        """Return the settling time [s] that the fraction `share` of the moves exceeds.
 
-        It is infinite if more moves than that do not settle.
+        The result is infinite if more moves than that do not settle.
         """
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
@@ -97,7 +97,8 @@ class MachineOutcomes:
     def worst(self) -> int:
         """Return the index of the worst move.
 
-        It is the restless move with the largest swing, or else the move that settles last.
+        The worst is the move that swings or creeps over the largest distance. If all come to rest, it is the move that
+        settles last.
         """
         rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
         return int(np.where(self.completed, rank, -np.inf).argmax())
@@ -167,7 +168,10 @@ def move_machines(
 def _followed_moves(
     flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
-    """Simulate moves, each followed for a time [s] after its last corner."""
+    """Simulate the moves of `count` stages, each followed for a time [s] after its last corner.
+
+    `window` is the position window [m]; `label` names the work to the progress.
+    """
     settings = DesignSettings.current()
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}

@@ -208,7 +208,10 @@ class Answer:
         return dataset_of(self.to_dict())
 
     def document_of_details(self) -> dict[str, Any]:
-        """Return what `--details` adds to the JSON document; this may take further computation."""
+        """Return what `--details` adds to the JSON document, by default nothing.
+
+        An answer that adds something may compute further for it.
+        """
         return {}
 
     def to_dict(self, details: bool = False) -> dict[str, Any]:

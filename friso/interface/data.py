@@ -59,7 +59,10 @@ def _label(record: Mapping[str, Any], number: int) -> str:
 
 
 def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
-    """Yield keys with numbers and texts of a table; a key in a table within has both names."""
+    """Yield keys with numbers and texts of a table; a key in a table within has both names.
+
+    `before` is the name of the tables around it.
+    """
     for key, value in record.items():
         if isinstance(value, dict):
             yield from _leaves(value, f"{before}{key}_")

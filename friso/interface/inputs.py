@@ -68,7 +68,10 @@ LOGGER = logging.getLogger("friso")
 
 
 def stage_of(source: StageLike, changes: Changes = None) -> Stage:
-    """Read a stage from a Stage, path or dictionary, and override keys. Raises InputError."""
+    """Read a stage from a Stage, path or dictionary, and override keys.
+
+    Raises InputError if the source or a change does not give a valid stage.
+    """
     wanted = changes_of(changes)
     if isinstance(source, Stage | Mapping):
         stage = source if isinstance(source, Stage) else Stage(**source)
@@ -88,14 +91,20 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
 
 
 def tables_of(source: StageLike) -> dict[str, Any]:
-    """Return the tables of a stage file as written, even if incomplete. Raises InputError."""
+    """Return the tables of a stage file as written, even if incomplete.
+
+    Raises InputError for a file that cannot be read.
+    """
     if isinstance(source, Stage):
         return source.as_written()
     return dict(source) if isinstance(source, Mapping) else load_tables(source)
 
 
 def changes_of(changes: Changes) -> dict[str, Any]:
-    """Return new values by key, from a dictionary or texts KEY=VALUE. Raises InputError."""
+    """Return new values by key, from a dictionary or texts KEY=VALUE.
+
+    Raises InputError for anything else.
+    """
     if changes is None:
         return {}
     keys: list[Any] = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
@@ -111,7 +120,7 @@ def read_stage(
     """Read a stage, override keys, and log doubts about the stage.
 
     The logger "friso" reports that centres of uncertain keys are used (unless `uncertain_too`), and names the tables
-    that the analysis `leaves_out`. Raises InputError.
+    that the analysis `leaves_out`. Raises InputError if the source or a change does not give a valid stage.
     """
     stage = stage_of(source, changes)
     for doubt in (*implausible_values(stage), *idle_encoder(stage)):
@@ -155,7 +164,7 @@ def mention_unstable_loop(stage: Stage) -> None:
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
     """Return the correlations of uncertain keys, from a file beside the stage file.
 
-    Raises InputError.
+    Without such a file, there are none. Raises InputError for a file that cannot be read or used.
     """
     correlations = Correlations()
     if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
@@ -170,7 +179,8 @@ _LONGEST_STEM = 150
 def stem_of(source: StageLike, usual: str = "stage") -> str:
     """Return a stem for names of files about a stage: the name of its file without suffix.
 
-    Bytes that are not text become "_". A long name is cut, so that suffixes still fit.
+    A stage without a file gets the `usual` stem. Bytes that are not text become "_". A long name is cut, so that
+    suffixes still fit.
     """
     if isinstance(source, Stage | Mapping):
         return usual
@@ -178,7 +188,10 @@ def stem_of(source: StageLike, usual: str = "stage") -> str:
 
 
 def tolerance_of(value: str | float) -> float:
-    """Read a relative tolerance of the solver. Raises InputError."""
+    """Read a relative tolerance of the solver.
+
+    Raises InputError unless it is a number from 1e-12 to 1e-2.
+    """
     from friso.engine.tolerance import checked_rtol
 
     try:
@@ -193,7 +206,10 @@ def text_of(value: str | float, unit: str) -> str:
 
 
 def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
-    """Convert a text with a unit, or a number in SI, to an SI value. Raises InputError."""
+    """Convert a text with a unit, or a number in SI, to an SI value.
+
+    Raises InputError, which names the option `name`, for a value that the `quantity` does not allow.
+    """
     try:
         return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
@@ -201,12 +217,18 @@ def quantity_of(value: str | float, name: str, quantity: Quantity, example: str 
 
 
 def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
-    """Read a time [s]. Raises InputError."""
+    """Read a positive time [s] of the option `name`.
+
+    Raises InputError, which shows the `example`, for any other value.
+    """
     return quantity_of(value, name, Quantity("s", positive, example))
 
 
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
-    """Read a whole number within limits. Raises InputError."""
+    """Check a whole number, and return it.
+
+    Raises InputError for the option `name` unless the number lies from `least` to `most`.
+    """
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
         long = whole and abs(value) >= 10**18
@@ -216,7 +238,10 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
 
 
 def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
-    """Check that a value is one of `choices`. Raises InputError for anything else."""
+    """Check that a value is one of `choices`, and return it.
+
+    Raises InputError for the option `name` otherwise.
+    """
     if not (isinstance(value, str) and value in choices):
         raise InputError(
             name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example
@@ -225,7 +250,10 @@ def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
 
 
 def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
-    """Return texts by key, from a dictionary or texts KEY=VALUE. Raises InputError."""
+    """Return texts by key, from a dictionary or texts KEY=VALUE.
+
+    Raises InputError for anything else, and for a key that occurs twice.
+    """
     if isinstance(values, Mapping):
         for key, value in values.items():
             if not isinstance(value, str):
@@ -249,7 +277,8 @@ def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
 def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: str) -> dict[str, Any]:
     """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-    Raises InputError.
+    `texts` are by the name of their option. Raises InputError for a text of another form, and for a key that occurs
+    twice.
     """
     every = dict(axes)
     for name, text in texts.items():

@@ -51,7 +51,10 @@ class OutputFolder:
     """The folder that a command writes into; `inputs` are the files that it reads."""
 
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
-        """Check the folder. Raises InputError if the command must not write there, or cannot."""
+        """Check the folder; with `overwrite`, other files and edited texts may be replaced.
+
+        Raises InputError if the command must not write there, or cannot.
+        """
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         refuse_place("--out", folder)
         if self.unfinished.is_symlink():
@@ -202,7 +205,7 @@ def check_file(
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
     """Write a file that the user names, whole or not at all.
 
-    Raises InputError if it must not be written, or cannot.
+    Raises InputError if it cannot be written, or exists already and `overwrite` is not set.
     """
     check_file(option, path, overwrite)
     place = Path(os.path.realpath(path))  # a link stays a link
@@ -221,9 +224,9 @@ def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputE
 def output_folder(
     command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
 ) -> OutputFolder | None:
-    """Return the folder that a command writes into, if any.
+    """Return the folder that a command writes into; None if no `folder` was named.
 
-    Raises InputError as `OutputFolder`.
+    Raises InputError if the command must not write there, even with `overwrite`, or cannot.
     """
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
@@ -241,7 +244,10 @@ def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress
 
 @contextmanager
 def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Iterator[Drafts]:
-    """Provide the drafts of some files. Raises OSError."""
+    """Provide the drafts of some files, which are deleted unless put in place.
+
+    Raises OSError if a draft cannot be written.
+    """
     with Drafts() as drafts:
         for number, (path, content) in enumerate(files.items()):
             progress(number, len(files), "files")
@@ -299,7 +305,7 @@ def digests_of(folder: Path) -> Digests:
 
 
 def _is_edited(text: Path, digests: Sequence[str]) -> bool:
-    """Tell whether a text is another than friso wrote; not where it cannot be read."""
+    """Tell whether a text differs from what friso wrote; False if it cannot be read."""
     try:
         return sha256(text.read_bytes()).hexdigest() not in digests
     except OSError:

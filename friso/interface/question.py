@@ -138,7 +138,7 @@ class Question:
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Return the parameters of the function."""
+        """Return the parameters of the question's function by name."""
         return signature(self.function).parameters
 
     @property

@@ -119,7 +119,7 @@ def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
 
 
 def _classes(pick: Any) -> list[type[Section]]:
-    """Return the classes of which one describes a table, depending on its keys."""
+    """Return the classes that a table may be read as; its keys decide on one of them."""
     variants = getattr(pick, "__self__", None)
     if isinstance(variants, Controllers):
         return [form for forms in variants.forms.values() for form in forms]

@@ -135,8 +135,8 @@ def _start(
 ) -> str:
     """Return the text of a file to start from.
 
-    The text is a specification, the stage of an axis in a parameter file, or the commented stage file. Raises
-    InputError.
+    The text is a specification for the stage file `spec`, the stage of an axis in the parameter file `source`, or the
+    commented stage file. Raises InputError if both files are named, or one cannot be used.
     """
     if spec is not None and source is not None:
         raise InputError("spec", "together with --from", "one of the two", "friso init --from machine.ini")

@@ -46,7 +46,7 @@ def came() -> int:
 
 
 def last_word(number: int) -> str:
-    """Return the last line that a command prints, which says what ended it."""
+    """Return the last line that a command prints, which says which signal ended it."""
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"
@@ -166,9 +166,10 @@ def _end_in_time(pipe: int) -> None:
 
 
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
-    """Raise a KeyboardInterrupt again that Python would lose in a finalizer or a callback.
+    """Schedule a KeyboardInterrupt again that Python would lose in a finalizer or a callback.
 
-    Python ignores exceptions there and prints a traceback. The work that an interrupt cuts short is not reported.
+    Python ignores exceptions there and prints a traceback. Other exceptions go to the handler `otherwise`, but not work
+    that an interrupt cuts short.
     """
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
         signal_later(_AGAIN, _arrived)

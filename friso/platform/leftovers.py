@@ -25,7 +25,8 @@ _TRIES = 3
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
     """Make a new, locked folder that only this user may open; remove it in the end.
 
-    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError.
+    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError if no folder
+    can be made and locked.
     """
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
@@ -37,7 +38,7 @@ def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
 
 
 def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
-    """Make a temporary folder where the system keeps temporary files."""
+    """Make a temporary folder, named by a prefix, where the system keeps temporary files."""
     return locked_folder(Path(tempfile.gettempdir()), prefix, "lock")
 
 
@@ -76,7 +77,10 @@ def is_leftover(folder: Path, lock: str) -> bool:
 
 
 def remove_leftover(folder: Path, lock: str) -> None:
-    """Remove a folder with all its content, as far as this user may, if it is a leftover."""
+    """Remove a folder with all its content, as far as this user may, if it is a leftover.
+
+    A leftover is a folder of which nobody holds the file `lock`.
+    """
     with _unless_locked(folder, lock) as free:
         if free:
             shutil.rmtree(folder, ignore_errors=True)

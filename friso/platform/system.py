@@ -108,7 +108,7 @@ if sys.platform == "win32":
     def name_new_file(draft: Path, path: Path) -> None:
         """Rename a draft to a path where nothing exists.
 
-        Raises OSError, FileExistsError if something does.
+        Raises FileExistsError if something is there, and OSError if the renaming fails.
         """
         once_free(partial(draft.rename, path))
 
@@ -225,7 +225,7 @@ else:
     def name_new_file(draft: Path, path: Path) -> None:
         """Rename a draft to a path where nothing exists.
 
-        Raises OSError, FileExistsError if something does.
+        Raises FileExistsError if something is there, and OSError if the renaming fails.
         """
         try:
             os.link(draft, path)

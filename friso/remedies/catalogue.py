@@ -77,7 +77,10 @@ class Remedy:
 
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
-        """Return a remedy that consists of one finished stage, without variables."""
+        """Return a remedy that consists of one finished stage, without variables.
+
+        `buys_joint` is true if the stage has a new joint.
+        """
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
@@ -109,16 +112,20 @@ def with_bandwidth(remedy: Remedy) -> Remedy:
 
 
 def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
-    """Return the remedy that varies all gains, after the variables `first`.
+    """Return the remedy that varies all gains, after the variables `first`, in a list.
 
-    The list is empty if the bandwidth would be the only variable.
+    The list is empty if the bandwidth would be the only variable. `buys_joint` is true if the remedy needs a new joint.
     """
     several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
 def _notch(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Yield a notch at the parasitic mode, unless the goal's bandwidth is reached without one."""
+    """Yield a remedy with a notch at the parasitic mode, if there is such a mode.
+
+    Nothing is yielded if a faster controller reaches the goal's bandwidth limit without a notch, or if the stage takes
+    no further filter.
+    """
     flat = stage.flat()
     if "parasitic.frequency" not in flat or _reaches(stage, goal):
         return

@@ -46,9 +46,9 @@ class Confirmation:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Return why the stage may still hunt, as names of `DOUBTS`.
+        """Return why the stage may still hunt, as names of `DOUBTS`; empty if it surely does not.
 
-        They are in `friso.questions.tune.present_words`. The reasons are the verdict, its certainty, and hunting at
+        `DOUBTS` are in `friso.questions.tune.present_words`. The reasons are the verdict, its certainty, and hunting at
         lower or higher bandwidths, or that the work was given up.
         """
         if self.word is None:

@@ -62,7 +62,7 @@ class MoveRange:
     def check(self, stage: Stage) -> None:
         """Check that the motion has time for the largest move at the lowest acceleration.
 
-        Raises InputError.
+        Raises InputError if it has not.
         """
         flat = stage.flat()
         slow = {ACCELERATION: self.accelerations[0]} if self.accelerations and ACCELERATION in flat else {}
@@ -139,7 +139,7 @@ class Fleet:
         return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the factors on keys of each machine, for the keys that the stage has.
+        """Return the keys of each machine as factors on the stage's, for keys that the stage has.
 
         Both parts of a split mass vary with the whole mass.
         """
@@ -158,7 +158,9 @@ def draw_fleet(
 
     The first machine is the stage file's own, with its own move or the nearest one of the range. The other moves fill
     the range evenly. Without `moves`, all machines make the file's move. A joint that is not in the file varies by the
-    default spreads. Raises InputError.
+    default spreads.
+
+    Raises InputError for an unusable number or seed, and if hardly any machine drawn is valid.
     """
     own = float(size(stage.flat()))
     moves = moves or MoveRange(own, own)

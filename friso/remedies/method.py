@@ -87,7 +87,7 @@ class Advice:
 
     @property
     def needed(self) -> bool:
-        """Tell whether the present stage fails the goal."""
+        """Tell whether the stage as it is misses the goal, or may miss it."""
         return bool(self.unmet)
 
     @property
@@ -132,7 +132,8 @@ class Advice:
     def recommended(self) -> tuple[RemedyOutcome, ...]:
         """Return the remedies that are described in full.
 
-        They are the smallest change, and the one that settles soonest or the next larger change.
+        First comes the smallest change. The remedy that settles soonest follows, or the next larger change if the
+        smallest already settles soonest.
         """
         return _recommended(self.working, self.goal)
 
@@ -170,9 +171,10 @@ def _working(outcomes: Iterable[RemedyOutcome], stage: Stage, goal: Goal) -> tup
 
 
 def _recommended(working: Sequence[RemedyOutcome], goal: Goal) -> tuple[RemedyOutcome, ...]:
-    """Choose which working remedies to describe in full.
+    """Choose which working remedies to describe in full; none if no remedy works.
 
-    These are the first, and the one that settles soonest; if that is the first, too, the second follows.
+    These are the first remedy and the one that settles soonest. If the first settles soonest, the second remedy follows
+    instead.
     """
     if not working:
         return ()
@@ -383,7 +385,7 @@ class _Session:
     def _combines(self, remedy: Remedy) -> bool:
         """Tell whether a remedy only combines other remedies that work alone.
 
-        Its variables are then those of at least two of them together.
+        Then its variables are those of at least two other remedies together.
         """
         names = {variable.name for variable in remedy.variables}
         working = (outcome.remedy for outcome in self.outcomes if outcome.certainty == "works")
@@ -477,7 +479,7 @@ class _Session:
     def tries_large_moves(self) -> None:
         """Verify settings that serve large moves only, first those that begin at the smallest move.
 
-        If an allowance of work is used up, the others are left out.
+        If an allowance of work is used up, the remaining settings are left out.
         """
         largest, listed = self.unseen.moves.largest, list[tuple[float, int, np.ndarray, TriedPoints]]()
         for place, outcome in enumerate(self.outcomes):
@@ -521,7 +523,8 @@ class _Session:
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
         """Verify settings that a search offers, in turn until some work, and record the outcome.
 
-        If none do, the first outcome is recorded, which is not sure to work. Few are tried, and the work is limited.
+        If no settings work, the first outcome is recorded, which is not sure to work. Few settings are tried, and the
+        work is limited.
         """
         settings = RemedySettings.current()
         unsure: RemedyOutcome | None = None
@@ -593,7 +596,7 @@ class _Session:
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """Return the settings against friction closest to the goal, each with a varied bandwidth.
 
-    They are tried only if no change of the controller alone works.
+    These remedies are tried only if no change of the controller alone works.
     """
     settings = RemedySettings.current()
     if any(outcome.certainty == "works" and not outcome.remedy.buys_joint for outcome in outcomes):

@@ -110,7 +110,7 @@ def _within(
 
 
 def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, within: float) -> RelaxedGoal:
-    """Build the goal that a point meets: the parts `names` are relaxed as far as it needs.
+    """Build the goal that a point meets: the parts `names` are relaxed as far as necessary.
 
     The tolerance is wider by the factor `within`.
     """

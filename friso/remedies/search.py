@@ -48,11 +48,13 @@ class TriedPoints:
     """The settings that were tried, one point in each row, and how the machines performed.
 
     `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for 95 % of the machines. They are `settling` within the tolerance, `looser` within a looser one, and
-    `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest force [N] and least
-    modulus margin hold for 95 % of the machines. The bandwidth [Hz] is that of the stage file's machine, where its loop
-    last crosses 0 dB. `nearness`, from 0 to 1, grows with the number of machines that settle or nearly settle.
-    `moves_from` [m] is the smallest move from which all machines settle; infinite if the largest move does not settle.
+    times [s] hold for the fraction `goal.share` of the machines. They are `settling` within the tolerance, and `looser`
+    within a looser one. `slower` is for the looser one, too, at a bandwidth lower by the distance from hunting. Largest
+    force [N] and least modulus margin hold for the same fraction.
+
+    The bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1,
+    grows with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
+    machines settle; infinite if the largest move does not settle.
 
     Points that are not `whole` were stopped early, and their missing moves count as the best possible.
     """
@@ -90,7 +92,7 @@ class TriedPoints:
         }
 
     def meets(self, goal: Goal) -> np.ndarray:
-        """Return which points break no constraint."""
+        """Return which settings meet every part of the goal, shape (n,)."""
         return ~np.any([*self.broken(goal).values()], axis=0)
 
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
@@ -200,7 +202,7 @@ class Search:
 
     @property
     def _work(self) -> float:
-        """Return the work allowed for a search."""
+        """Return the work allowed for this search, in the units of `Allowance`."""
         settings = RemedySettings.current()
         return settings.search_work * (settings.setting_work_share if self.remedy.of_setting else 1.0)
 
@@ -214,10 +216,10 @@ class Search:
                 self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
-        """Minimise the cost over the variables of the remedy.
+        """Minimise the settling time, or the quantity `wanted` if given, over a remedy's variables.
 
         One variable is searched on a grid, which is then refined. Several variables are searched by differential
-        evolution, then again in smaller ranges around the best point.
+        evolution, if given from the points `start`, then again in smaller ranges around the best point.
         """
         tuning = RemedySettings.current()
         variables = len(self.remedy.variables)
@@ -267,7 +269,7 @@ class Search:
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Return coordinates between grid points at which a variable reaches the bandwidth limit.
 
-        The bandwidth rises through the limit there.
+        The bandwidth rises through the limit there. The list is empty if the goal has no limit.
         """
         settings = RemedySettings.current()
         limit = self.goal.bandwidth_limit
@@ -436,8 +438,9 @@ class Search:
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
         """Return better settings near a point (variables,), the best first.
 
-        The point was taken because better ones failed: there machines hunted, or too few met the goal. New points are
-        chosen at random around the point, then around the point taken next.
+        The best settle soonest, or have the least `wanted` if given. The point was taken because better ones failed:
+        there machines hunted, or too few met the goal. New points are chosen at random around the point, then around
+        the point taken next.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -481,14 +484,14 @@ def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | Non
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Tell for each point which of the others is equal to it, shape (points, others)."""
+    """Tell which points are equal to which others, shape (points, others)."""
     return (shares[:, None] == others[None]).all(axis=2)
 
 
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return the distance of points from the nearest of the others, shape (points,).
 
-    It is the largest difference of a coordinate; infinite without others.
+    The distance is the largest difference of a coordinate; infinite without others.
     """
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 

@@ -67,9 +67,9 @@ class EdgeDerivatives:
 class SettlingDerivatives:
     """The settling `time` [s] of the stage's own move, and its derivatives [s/SI], (keys,).
 
-    The time runs from the last corner of the reference until the stage stays `within` [m]. It jumps where a turning
-    point crosses the edge of the band. `jump` is the distance of the nearest turning point from that edge, over the
-    band.
+    The time runs from the last corner of the reference until the stage stays `within` [m]. The time jumps where a
+    turning point crosses the edge of this band. `jump` is the distance of the nearest turning point from that edge,
+    over the band.
     """
 
     within: float
@@ -130,7 +130,8 @@ def sensitivity(
     `within` [m], the deviation that counts as in position, the settling time is differentiated as well.
 
     Derivatives of the cycle and of the settling time are exact. They follow from variational equations along the keys,
-    with saltation at kinks. Only the part by which keys move the start of a move is by central differences.
+    with saltation where the equations switch. Only the part by which keys move the start of a move is by central
+    differences.
 
     The edge is that of a flip. Its derivatives follow from the multipliers, which are exact derivatives of the flow;
     their own change is taken by central differences. Derivatives of the margin are central differences of the loop at
@@ -284,8 +285,8 @@ def _is_smooth(
     """Tell whether the settling time changes smoothly with each key.
 
     The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a little
-    either way, and the new times are compared with what the derivatives `by` predict. They differ if the stage bounces
-    on its limiter so often that neighbouring motions diverge.
+    either way, and the new times are compared with what the derivatives `by` predict. Times and predictions differ if
+    the stage bounces on its limiter so often that neighbouring motions diverge.
     """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])

@@ -78,7 +78,7 @@ def moves_of_points(
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Return sampling, delay and current loop of a stage, as numbers in SI by key."""
+    """Return the keys of a stage's [drive] as numbers in SI, such as sample time and delay."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 
@@ -125,12 +125,12 @@ class Attraction:
 
     @property
     def clear(self) -> np.ndarray:
-        """Tell which machines do not hunt, as far as simulations show."""
+        """Tell which machines do not hunt, as far as simulations show, shape (points, machines)."""
         return ~self.attracts & self.decided
 
     @property
     def surely_clear(self) -> np.ndarray:
-        """Tell which machines certainly do not hunt."""
+        """Tell which machines certainly do not hunt, shape (points, machines)."""
         return ~self.attracts & self.certain
 
 

@@ -64,21 +64,21 @@ class Performance:
     def slowest(self, goal: Goal) -> float:
         """Return the time [s] in which enough machines settle, the fraction `goal.share`.
 
-        It is infinite if they do not.
+        The time is infinite if too few machines settle.
         """
         return float(self.moves.slowest(goal.share)[0])
 
     def slowest_interval(self, goal: Goal) -> tuple[float, float]:
         """Return the 95 % interval of the time [s] in which enough machines settle (`goal.share`).
 
-        It allows for the few machines that were drawn.
+        The interval is wider, the fewer machines were drawn.
         """
         low, high = quantile_interval(self.moves.settling[0], goal.share)
         return max(low, 0.0), high
 
     @property
     def median(self) -> float:
-        """Return the median settling time [s]."""
+        """Return the median settling time [s]; infinite if more than half do not settle."""
         return float(np.median(self.moves.settling))
 
     def force(self, goal: Goal) -> float:
@@ -163,7 +163,7 @@ class Performance:
     ) -> Performance:
         """Survey the machines with indices `numbers` for hunting, if they meet all else.
 
-        Returns the performance with the results.
+        With `at_once`, all bandwidths are simulated together. Returns the performance with the results.
         """
         some = numbers[self._meets_all(goal)[numbers]]
         if not some.size:

@@ -11,7 +11,7 @@ from friso_thesis.commands.unfinished import kept_until_done
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Compute the guideline, continuing an interrupted run."""
+    """Compute the guideline, and show it; an interrupted run is continued."""
     from friso.interface.output_folder import UNFINISHED
     from friso_thesis.studies.guideline.compute import checked_samples
     from friso_thesis.studies.guideline.sweeps import Keep

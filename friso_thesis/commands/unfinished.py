@@ -28,9 +28,9 @@ class UnfinishedWork(Protocol):
 
 @contextmanager
 def kept_until_done(work: UnfinishedWork, piece: str, pieces: str) -> Iterator[None]:
-    """Keep finished `pieces` within the block, so that the same command can resume.
+    """Keep finished pieces of work within the block, so that the same command can resume.
 
-    If no piece is finished, no folder is left.
+    `piece` and `pieces` are the word for them in a message. If no piece is finished, no folder is left.
     """
     assert work.folder is not None
     missing = [folder for folder in (work.folder, *work.folder.parents) if not folder.exists()]

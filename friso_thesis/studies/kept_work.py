@@ -52,7 +52,7 @@ class KeptWork:
         make: Callable[[], Mapping[str, np.ndarray]],
         names: Collection[str] | None = None,
     ) -> Mapping[str, np.ndarray]:
-        """Return arrays by name, as saved under `about`, or computed now.
+        """Return arrays by name, as saved under `about`; otherwise `make` and save them.
 
         A saved piece must have exactly the given `names`.
         """

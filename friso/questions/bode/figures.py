@@ -94,8 +94,8 @@ class ResponseCurve:
 def phases(responses: Sequence[np.ndarray]) -> list[Array]:
     """Return phases [deg] of complex responses (k,) without jumps of 360 degrees.
 
-    The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with it
-    at high frequencies, where all loops behave alike.
+    The first phase begins between -315 and 45 degrees. The others are shifted by whole turns until they agree with the
+    first at high frequencies, where all loops behave alike.
     """
     angles = [np.angle(response) for response in responses]
     lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag

@@ -24,7 +24,7 @@ DEFINITIONS = (
 
 
 def bode_files(bode: Bode) -> dict[str, Content]:
-    """Return the page, and every figure in all formats."""
+    """Return the page, and every figure in all formats, by file name."""
     figures = bode_figures(bode)
     images = pictures(figures)
     return {"bode.html": bode_html(bode, figures), **images}

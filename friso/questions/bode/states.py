@@ -78,12 +78,15 @@ def dash(name: str) -> Dash:
 
 
 def place(member: Members, bode: Bode) -> str:
-    """Return a state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
+    """Return a state in words that tell it from others: "sliding at 1.78 mm/s, limiter free"."""
     return in_words(cart(member, bode), bool(member.touched[0]), has_limiter(bode))
 
 
 def in_words(cart: str, touched: bool, limited: bool) -> str:
-    """Join what the cart does with the state of the limiter, if the limiter has two states."""
+    """Describe a state: what the cart does, and whether the limiter is `touched` or free.
+
+    The limiter is left out unless it can be both (`limited`).
+    """
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 
@@ -109,7 +112,7 @@ def side(touched: bool) -> str:
 def has_limiter(bode: Bode) -> bool:
     """Tell whether the limiter can be both free and touched.
 
-    It can be only one of both if the joint is locked or has no stroke.
+    If the joint is locked or has no stroke, only one of these states is possible.
     """
     return bool(np.ptp(bode.scan.members.touched.astype(int)))
 

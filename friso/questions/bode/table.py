@@ -41,7 +41,7 @@ def _of_loop(item: ShownState, loop: CascadeLoop, name: str) -> str:
 
 
 def decibels(factor: float) -> float:
-    """Convert a factor to decibels [dB]."""
+    """Convert a factor on an amplitude to decibels: 10 is 20 dB."""
     return 20 * math.log10(factor)
 
 
@@ -58,9 +58,9 @@ def growth(margins: Margins) -> str:
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
-    """Write a margin by `text`, or say that any change is allowed or the margin is not known.
+    """Write a margin by `text`; a dash if it is NaN.
 
-    Any change is allowed if the margin equals `none`.
+    If the margin equals `none`, the text says that any change is allowed.
     """
     if math.isnan(value):
         return NOTHING

@@ -34,7 +34,7 @@ TARGET = (
 
 
 def sentences(bode: Bode) -> list[str]:
-    """Return all sentences of the answer in order."""
+    """Return all sentences: stability, how fast the controller may be, and caveats."""
     limits = [crossover_heading(bode), *crossovers(bode).values()]
     return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
 
@@ -178,7 +178,10 @@ def _speeds(unstable: Unstable, bode: Bode) -> str:
 
 
 def _why(bode: Bode) -> list[str]:
-    """Say why states are unstable: by friction that falls with speed, or by tuning."""
+    """Say why states are unstable: by friction that falls with speed, or by tuning.
+
+    The list is empty if neither explains all unstable states.
+    """
     settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
     if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
         even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""
@@ -192,7 +195,10 @@ def _why(bode: Bode) -> list[str]:
 
 
 def _limits(bode: Bode, name: str) -> str:
-    """Say over which crossovers the loop is stable, and over which its modulus margin is good."""
+    """Say over which crossovers the loop is stable, and over which its modulus margin is good.
+
+    `name` is the state of the joint.
+    """
     limits = bode.limits[name]
     stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
     calm = _remark(bode, name, limits.highest_comfortable, "closest to −1", limits.closest)
@@ -205,8 +211,8 @@ def _limits(bode: Bode, name: str) -> str:
 def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
     """Name in brackets the state that is unstable first, or closest to -1, as bandwidth rises.
 
-    `member` is this state (None: nothing is said), and `meaning` says which of both it is. `end` is the bandwidth above
-    which that holds; without one, it holds for the stage as given.
+    `member` is this state (None: nothing is said), and `meaning` says in words why it is named. `end` is the bandwidth
+    above which the remark holds; without one, it holds for the stage as given.
     """
     if member is None or len(bode.scan.members) == 1:
         return ""
@@ -223,6 +229,6 @@ def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:
 
 
 def tables(bode: Bode) -> list[AnswerTable]:
-    """Return the table of margins in each state."""
+    """Return the table of stability margins, with a column for each state."""
     states = shown_states(bode)
     return [AnswerTable(bode.stage.name, [item.label for item in states], rows(states))]

@@ -83,7 +83,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 
 
 def _meeting(meeting: Meeting, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """Return where and how two curves meet, and whether one cycle changes there."""
+    """Return where and how two curves meet, and whether both are changes of one cycle."""
     return {
         "curves": list(meeting.curves),
         "how": meeting.kind,

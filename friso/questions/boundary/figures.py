@@ -103,9 +103,10 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
-    """Draw one measure of all branches, with their flips, folds and other special points.
+    """Draw one measure of all branches, such as the period, with folds and other special points.
 
-    Labels are added if there is a key.
+    `measure` is a field of `Line`. Lines and points are labelled only if there is a `key`, in whose unit values are
+    written.
     """
     labels: set[str] = set()
     series = []
@@ -175,6 +176,6 @@ def _marks(places: Sequence[np.ndarray] | np.ndarray, label: str, colour: str, s
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
-    """Return the axis of a key over its range, widened on both sides by a fraction of the range."""
+    """Return the axis of a key over its range, widened on both sides by the fraction `margin`."""
     low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
     return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

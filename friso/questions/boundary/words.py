@@ -71,7 +71,7 @@ class ShownKey:
         return float(f"{value / self.factor:.15g}")
 
     def text(self, value: float, digits: int = 6) -> str:
-        """Write a value [SI] with its unit."""
+        """Write a value [SI] in the unit shown, to at most `digits` digits."""
         return self._with_unit(f"{self.number(value):.{digits}g}")
 
     def uncertain(self, value: float, error: float) -> str:
@@ -119,7 +119,10 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say at which of the values tried the loop is unstable, whatever the friction."""
+    """Say at which of the values tried the loop is unstable, whatever the friction.
+
+    The list is empty if it is stable at all of them.
+    """
     if not traced.unstable.any():
         return []
     points = traced.places[:, None] if isinstance(traced, Diagram) else traced.space.grid(traced.nodes)[traced.allowed]
@@ -185,7 +188,10 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where the curve with this index runs, and how it ends there."""
+    """Say from where to where the curve with this index runs, and how it ends there.
+
+    Values have `digits` digits.
+    """
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
     start, stop = (_place(end.at.tolist(), keys, digits) for end in ends)
@@ -206,7 +212,7 @@ def _first_meetings(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def meeting_sentences(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say for each meeting of two curves where they meet, and whether one cycle changes there."""
+    """Say for each meeting of two curves where they meet, and whether both change one cycle."""
     return [_meeting(meeting, lines(traced), keys) for meeting in curve_meetings(traced)]
 
 
@@ -254,10 +260,10 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
-    """Say between which of the values tried a cycle attracts as well.
+    """Say in which ranges between the values tried a cycle attracts as well.
 
     `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
-    errors [SI].
+    errors [SI]. Values that belong to no range are listed by themselves. The list is empty without `turns`.
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
@@ -358,7 +364,10 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Say near which points hunting changes although no curve could be followed from there."""
+    """Say near which points hunting changes although no curve could be followed from there.
+
+    The list is empty if there are no such points.
+    """
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
@@ -378,7 +387,7 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _ends(line: Line) -> str:
-    """Say how a line ends, to follow the words on where it runs."""
+    """Say how a branch of cycles ends at both ends, as the last part of a sentence."""
     if set(line.ends) == {END_OF_RANGE}:
         return ", to both ends of the range"
     return f"; ends: {'; '.join(dict.fromkeys(line.ends))}"

@@ -52,7 +52,7 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
 def _return_map(item: ShownCase) -> list[Panel]:
     """Return the panel of a stage's return map; none if swings were not followed.
 
-    It shows the map, the diagonal, the swings of this motion, the cycles, and the basin of hunting.
+    The panel shows the map, the diagonal, the swings of the stage's own motion, the cycles, and the basin of hunting.
     """
     hunting = item.case.judgement.hunting
     if hunting.returns is None:
@@ -83,8 +83,8 @@ def _mirrored(hunting: Hunting) -> bool:
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
     """Return strips of distances, up to `reach` [m], from which a stage ends in hunting.
 
-    From sticking at one of the `distances`, the stage next sticks at one of the `returns` [m] on the other side. Both
-    sides must behave alike. These returns are followed over many swings.
+    A stage that sticks at one of the `distances` sticks next at one of the `returns` [m] on the other side. Both sides
+    must behave alike. Many swings are followed by these pairs.
     """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts

@@ -152,13 +152,13 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
 
 
 def _margin(edge: Margin) -> dict[str, Any]:
-    """Return the margin of the verdict in bandwidth."""
+    """Return how far the bandwidth is from the edge of hunting, for the document."""
     crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
     return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
 
 
 def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
-    """Return one end of the bandwidths at which hunting attracts."""
+    """Return one end of the bandwidths at which hunting attracts; None if there is no end."""
     if end is None:
         return None
     return {

@@ -61,7 +61,7 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 def draws_sentences(draws: Draws) -> list[str]:
     """Say what the machines drawn do, with the joint as given, locked and free.
 
-    Then say which were left out.
+    If invalid draws were left out, the last sentence says how many and why.
     """
     sample = draws.sample
     cut = [f"Interrupted: {sample.count} of {draws.asked} stages were drawn so far."] * (sample.count < draws.asked)
@@ -101,7 +101,7 @@ def _edge(draws: Draws) -> str:
 def _narrowed(draws: Draws) -> str:
     """Say which key should be measured to narrow the ranges most; "" if this is not known.
 
-    It is the key with which the amplitudes of hunting correlate most.
+    The key is the one with which the amplitudes of hunting correlate most.
     """
     fates = draws.fates["given"]
     shown = np.flatnonzero(np.isfinite(fates.amplitudes))

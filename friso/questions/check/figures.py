@@ -173,7 +173,7 @@ def _overview(cases: list[ShownCase]) -> Figure:
 
 
 def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
-    """Return the controller's force limit if a run comes near it.
+    """Return the controller's force limit if a run takes more than half of it; empty otherwise.
 
     A distant limit would flatten all curves.
     """

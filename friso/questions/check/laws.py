@@ -75,7 +75,7 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _all(laws: VerdictsByLaw) -> str:
-    """Say how many laws were tried."""
+    """Name all friction laws tried by their number: "both laws that were tried"."""
     count = len(laws.verdicts)
     if count == 1:
         return "the one law that was tried"
@@ -95,7 +95,10 @@ def _does(verdicts: set[str]) -> str:
 
 
 def _open(verdict: LawVerdict, case: str) -> str:
-    """Say what the stage does under one law with different values of its free parameters."""
+    """Say what the stage does under one law with different values of its free parameters.
+
+    `case` is "given", "locked" or "free", by the state of the joint.
+    """
     trials: dict[str, list[Trial]] = {}
     for trial in verdict.trials:
         does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
@@ -122,7 +125,10 @@ def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
-    """Say over which bandwidths the edge of hunting lies under all laws."""
+    """Say between which bandwidths the edge of hunting lies, over all friction laws.
+
+    If there is no edge, or it was not searched under some laws, the text says so.
+    """
     edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""

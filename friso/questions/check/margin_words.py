@@ -81,7 +81,10 @@ def _side(side: int) -> str:
 
 
 def _way(side: int, end: MarginEnd) -> str:
-    """Say between which multiples of a parameter hunting begins or ends."""
+    """Say between which multiples of a parameter hunting begins or ends.
+
+    `side` is 1 for multiples above the stage's own value, and -1 for those below.
+    """
     if end.same == 1:  # how little change is enough is not known
         return f"at {plain_factor(end.other)} times yours or {'less' if side > 0 else 'more'}"
     low, high = sorted((end.same, end.other))

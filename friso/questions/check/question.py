@@ -234,7 +234,9 @@ def checked_stage(
 ) -> CheckAnswer:
     """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
-    Raises InputError for a number of draws that is not usable.
+    `draws` is the number of machines; by default, as many as a fixed work allows. With `laws`, the stage is checked
+    under other friction laws, too. `tolerance` is that of the solver. Raises InputError for a number of draws that is
+    not usable.
     """
     settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)
@@ -276,7 +278,7 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return a check's result, not certain if the drive alone makes the loop unstable."""
+    """Return a case of the check, not certain if the drive's sampling makes the loop unstable."""
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")

@@ -198,7 +198,7 @@ def _settled_within(band: float) -> Callable[[Case], str]:
 def _tracked(size: Callable[[Tracking], float]) -> Callable[[Case], str]:
     """Return a function that writes how well a stage follows a reference that keeps moving.
 
-    `size` picks the error [m].
+    `size` reads the error [m] to write. For a reference that stops, a dash is written.
     """
     return lambda case: with_unit(size(case.tracking), "m") if case.tracking else NOTHING
 

@@ -1,4 +1,4 @@
-"""Say in words what a check found, for each state of the joint, and the conclusion."""
+"""Say in words what a check found for each state of the joint, and what follows from that."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say where the loop is unstable, even without friction or by the drive alone."""
+    """Say where the loop is unstable, even without friction or by the drive alone; else empty."""
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -177,7 +177,7 @@ def _following(case: Case) -> str:
 
 
 def _too_much(what: str) -> str:
-    """Say that something was not determined because it takes too much work."""
+    """Say that something, named by `what`, was not determined because it takes too much work."""
     return f"{what} was not determined, as that takes more work than a check may"
 
 
@@ -222,7 +222,7 @@ def _transient(case: Case) -> str:
 
 
 def _held(case: Case) -> list[str]:
-    """Say how large the force limit is, and that break-away takes more, if it does."""
+    """Say how large the force limit is, and if break-away takes more; empty without a limit."""
     if case.force_limit is None:
         return []
     limit, least = _forces(case.force_limit, case.breakaway)
@@ -244,7 +244,10 @@ def _settling(case: Case) -> str:
 
 
 def _later(case: Case) -> str:
-    """Say that a motion which still swings at the end of its run comes to rest later."""
+    """Say that a motion which still swings at the end of its run comes to rest later.
+
+    The text is empty if its settling time is known, and unless it swings by 10 um or more about its reference.
+    """
     if case.in_the_end.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON or case.offset > _TEN_MICRON:
         return ""
     return f" (later than in its run of {with_unit(case.stage.flat()['motion.duration'], 's')})"
@@ -362,9 +365,9 @@ def _present_bandwidth(case: Case) -> float | None:
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
-    """Write a bandwidth that is `factor` times that of the stage.
+    """Write a bandwidth that is `factor` times that of the stage, rounded to some digits.
 
-    It is rounded upward or downward to some digits, or to the nearest number with `up` = None.
+    It is rounded up if `up` is true, down if `up` is false, and to the nearest number if `up` is None.
     """
     crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
@@ -377,13 +380,16 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key that sets the bandwidth if it is not a crossover; None if it is one."""
+    """Return the key that sets the bandwidth; None if it is a crossover or does not exist."""
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
 def _windows(case: Case) -> list[str]:
-    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again."""
+    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again.
+
+    The list is empty if there are no such ranges.
+    """
     places = [_window(case, window) for window in case.judgement.windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
@@ -403,7 +409,10 @@ def _window(case: Case, window: BandwidthWindow) -> str:
 
 
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
-    """Say what the survey of bandwidths may have missed between its steps."""
+    """Say what the survey of bandwidths may have missed between its steps.
+
+    The list is empty if no case has a margin in bandwidth.
+    """
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     low, high = SEARCH_LIMITS.lowest_bandwidth, SEARCH_LIMITS.highest_bandwidth
@@ -436,7 +445,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
-    """Say to which lower bandwidth the stage settles."""
+    """Say to which lower bandwidth the stage settles, in place of a higher one."""
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
     return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
 
@@ -467,7 +476,10 @@ def _faster(case: Case, edge: Margin) -> str:
 
 
 def _with_other_friction(case: Case) -> str:
-    """Say whether the bandwidth advised keeps a margin in static friction."""
+    """Say whether the bandwidth advised keeps a margin in static friction.
+
+    The text is empty if this was not examined.
+    """
     if case.advice_keeps_friction is None:
         return ""
     distance = SEARCH_LIMITS.edge_distance

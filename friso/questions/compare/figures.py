@@ -96,7 +96,10 @@ def _bars(
 
 
 def _settling(comparison: Comparison, within: str) -> Panel:
-    """Return the panel of the fraction of machines in position over the time since the move."""
+    """Return the panel of the fraction of machines in position over the time since the move.
+
+    `within` writes the length that counts as in position.
+    """
     flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
     times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]

@@ -61,13 +61,13 @@ def label(result: OptionResult) -> str:
 
 
 def in_prose(result: OptionResult) -> str:
-    """Name an option within a sentence."""
+    """Name an option with its letter, to stand within a sentence."""
     kind = result.option.kind
     return f"{kind.prose or f'the {kind.title}'} ({kind.letter})"
 
 
 def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
-    """Return what each option is, by its label."""
+    """Return a row for each option: its label, and its joint and controller in words."""
     return [(label(result), _about(result.option, comparison)) for result in comparison.results]
 
 
@@ -189,7 +189,7 @@ def answer(comparison: Comparison) -> list[str]:
 
 
 def _interrupted(comparison: Comparison) -> list[str]:
-    """Say which options were not run because of an interruption."""
+    """Say which options were not run because of an interruption; empty if all were run."""
     if not comparison.not_run:
         return []
     letters = listed([option.letter for option in comparison.not_run], "and")
@@ -197,7 +197,10 @@ def _interrupted(comparison: Comparison) -> list[str]:
 
 
 def _turning(comparison: Comparison) -> list[str]:
-    """Say from which bandwidth on a faster controller alone brings the machines to rest."""
+    """Say from which bandwidth on a faster controller alone brings the machines to rest.
+
+    The list is empty if this was not computed, or if they come to rest as they are.
+    """
     needed, base = comparison.needed, comparison.results[0]
     if needed is None or base.rests:
         return []
@@ -222,7 +225,10 @@ def _share_at(needed: NeededBandwidth, number: int) -> str:
 
 
 def _unstable(comparison: Comparison) -> list[str]:
-    """Say on how many machines the loop is unstable as it is, whatever the friction."""
+    """Say on how many machines the loop is unstable as it is, whatever the friction.
+
+    The list is empty if there are no such machines.
+    """
     base, count = comparison.results[0], comparison.machines.count
     if not base.unstable:
         return []
@@ -259,7 +265,10 @@ def conclusion(comparison: Comparison) -> str:
 
 
 def _too_late(resting: Sequence[OptionResult]) -> str:
-    """Say with which options half of the machines miss the far end of their motion in time."""
+    """Say with which options half of the machines miss the far end of their motion in time.
+
+    The text is empty if there is no such option.
+    """
     late = [result for result in resting if not np.isfinite(result.settling.value)]
     if not late:
         return ""
@@ -267,12 +276,15 @@ def _too_late(resting: Sequence[OptionResult]) -> str:
 
 
 def _number(result: OptionResult, count: int) -> str:
-    """Write how many of the machines are in position at the end."""
+    """Write how many of the machines (`count`) are in position at the end with an option."""
     return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
 
 
 def _cost(result: OptionResult, comparison: Comparison) -> str:
-    """Write an option's force over that of option a, the first, and its modulus margins."""
+    """Write an option's force over that of option a, the first, and its modulus margins.
+
+    The text is empty for option a itself.
+    """
     if result is comparison.results[0]:
         return ""
     loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
@@ -282,7 +294,7 @@ def _cost(result: OptionResult, comparison: Comparison) -> str:
 
 
 def _as_is(comparison: Comparison) -> str:
-    """Say what the machines do without any option, unless they come to rest."""
+    """Say what the machines do as they are, in option a; empty if enough of them come to rest."""
     base, count = comparison.results[0], comparison.machines.count
     if base.rests:
         return ""
@@ -291,7 +303,7 @@ def _as_is(comparison: Comparison) -> str:
 
 
 def _recommendation(comparison: Comparison) -> list[str]:
-    """Say whether to buy a joint."""
+    """Say whether to buy a joint; empty if no option brings the machines to rest."""
     resting = _resting(comparison)
     joint = [result for result in resting if result.option.kind.joint]
     settings = [result for result in resting if not result.option.kind.joint]
@@ -312,7 +324,10 @@ def _recommendation(comparison: Comparison) -> list[str]:
 
 
 def _performance(comparison: Comparison) -> list[str]:
-    """Say how fast each successful option is, how still machines stand then, and how sure that is."""
+    """Say how fast each successful option is, how still machines stand, and how sure that is.
+
+    The list is empty if no option brings the machines to rest.
+    """
     resting, followed = _resting(comparison), min(FOLLOWED, comparison.machines.count)
     lines = [
         f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
@@ -325,7 +340,7 @@ def _performance(comparison: Comparison) -> list[str]:
 
 
 def _still(result: OptionResult, comparison: Comparison) -> str:
-    """Write the standstill RMS [m], if the floor shakes."""
+    """Write how still machines stand, as an RMS [m], if the floor shakes; empty otherwise."""
     return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
 
 
@@ -340,7 +355,7 @@ def _failing(comparison: Comparison) -> list[str]:
 
 
 def _in_the_longer_run(result: OptionResult) -> str:
-    """Say how many machines stay in position in the longer run; empty if none was made."""
+    """Say how many machines stay in position in a longer run; empty if there was no such run."""
     if not result.later.done.size:
         return ""
     return f"; {share_with_interval(result.stays)} stay there throughout the last half of a run {LONGER} times as long"
@@ -370,7 +385,7 @@ def _resting(comparison: Comparison) -> list[OptionResult]:
 
 
 def population(comparison: Comparison) -> list[str]:
-    """Say how the machines were drawn."""
+    """Say how the machines were drawn: how many, and how far each key spreads."""
     machines = comparison.machines
     lines = [
         f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "

@@ -62,7 +62,7 @@ def _faster(design: Design) -> str:
 
 
 def _parallel(design: Design) -> str:
-    """Write the gains of Eq. 6 (thesis) as a PID on the error with its low-pass time constant."""
+    """Write the gains of Eq. 6 (thesis) in parallel form: a PID on the error, and its low-pass."""
     kp, ki, kd, tau = design.controller.gains.parallel.values()
     gains = f"{trimmed(kp, 'N/m')}, {trimmed(ki, 'N/(m*s)')}, {trimmed(kd, 'N*s/m')}"
     return f"{gains}, with a low-pass filter of time constant τ_p = {trimmed(tau, 's')}"
@@ -146,7 +146,7 @@ def _met(design: Design) -> str:
 
 
 def _worst(outcome: MachineOutcomes) -> str:
-    """Describe the worst simulated move."""
+    """Describe the worst simulated move: how far it swings or creeps, or how late it settles."""
     k = outcome.worst
     if outcome.restless[k]:
         return f"The worst move, which {outcome.words[k]} over {trimmed(outcome.swing[k], 'm')}"

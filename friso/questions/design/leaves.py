@@ -31,7 +31,10 @@ def leaves_step(design: Design) -> DesignStep:
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
-    """Return the requirements: name, the keys that relax it, their values, and how much is used."""
+    """Return a row for each requirement: its name, the keys that relax it, and their values.
+
+    The last text of a row is the fraction of the requirement that the leaves use up.
+    """
     choice = design.fitted.choice
     return [
         (

@@ -140,7 +140,10 @@ def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -
 
 
 def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
-    """Warn about everything that neither stage file nor specification states."""
+    """Warn about everything that neither stage file nor specification states.
+
+    `outlined` is true if there is no specification and one was made from the stage.
+    """
     from friso.equations.bandwidth import bandwidth
     from friso.shown.drawing.prefixes import with_unit
 

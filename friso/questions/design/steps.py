@@ -17,7 +17,7 @@ GAP = 1.0
 
 
 def steps(design: Design) -> tuple[DesignStep, ...]:
-    """Return all steps of the method in order."""
+    """Return all steps of the design method in order, each with its result and reasons."""
     return isolator_step(design), joint_step(design), leaves_step(design), controller_step(design), moves_step(design)
 
 
@@ -82,7 +82,7 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
 
 
 def _stroke(design: Design) -> str:
-    """Say why the joint has this stroke."""
+    """Say why the joint has this stroke: because of the specification or of the leaf springs."""
     stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is as specified."
@@ -113,7 +113,10 @@ def _worst(corners: Corners, design: Design) -> list[str]:
 
 
 def _gap(design: Design) -> list[str]:
-    """Compare the friction lost at break-away with what hunting needs according to the thesis."""
+    """Compare the friction lost at break-away with what hunting needs according to the thesis.
+
+    The list is empty for a friction law that has no static and Coulomb friction.
+    """
     losses = gaps(design.without, design.original.flat())
     if losses is None:
         return []

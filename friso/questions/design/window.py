@@ -28,7 +28,8 @@ def comfortable(design: Design) -> Range:
 def stiffest(design: Design) -> float:
     """Return the highest crossover [Hz] that leaf springs on the Pareto front allow.
 
-    It is a fraction of the highest first frequency on the front that disturbs control.
+    The crossover is a fixed fraction of the highest frequency on the front of a first mode that interferes with
+    control.
     """
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 

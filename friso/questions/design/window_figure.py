@@ -22,7 +22,10 @@ CHOSEN, EDGES = "#e3001b", "#7a3300"
 
 
 def window_figure(design: Design) -> Figure:
-    """Draw bars over the crossover, from the machine's limit in the top row down to hunting."""
+    """Draw bars over the crossover: which crossovers are allowed, and at which stages hunt.
+
+    The rows are the machine's limit, the leaf springs, the modulus margin, and hunting with and without the isolator.
+    """
     visible = view(design)
     factor, multiple = design.spec.safety.hunting, design.spec.safety.parasitic
     allowed = [

@@ -133,7 +133,7 @@ def brings(design: Design) -> str:
 
 
 def leaves(design: Design) -> str:
-    """Describe the leaf springs chosen."""
+    """Describe the leaf springs chosen: number, dimensions and material."""
     return leaf_words(design.fitted.choice.geometry)
 
 
@@ -147,7 +147,7 @@ def leaf_words(geometry: Geometry) -> str:
 
 
 def _verified(design: Design) -> tuple[str, str]:
-    """Say how many simulated moves come to rest, with the colour of the verdict."""
+    """Say how many simulated moves come to rest; return the text and the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
     held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
     if design.needed and not locked.missed:
@@ -278,12 +278,12 @@ def seconds(time: float) -> str:
 
 
 def sentences(design: Design | UnfinishedDesign) -> list[str]:
-    """Return the verdicts on the design."""
+    """Return the verdicts on the design; if it is unfinished, what is decided so far."""
     if isinstance(design, UnfinishedDesign):
         return so_far(design)
     return [sentence for _, sentence in headline(design)]
 
 
 def next_steps(design: Design | UnfinishedDesign, files: Sequence[Path]) -> list[str]:
-    """Return the command that checks the design."""
+    """Return the command that checks the design; empty if no file was written."""
     return [f"friso check {shell_word(str(files[0]))}"] if files else []

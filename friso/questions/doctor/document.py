@@ -10,7 +10,7 @@ from friso.studies.doctor import DoctorCheck
 
 
 def doctor_document(checks: Sequence[DoctorCheck]) -> dict[str, Any]:
-    """Return the conclusion and every check."""
+    """Return whether friso works, and the result of every check."""
     return {
         "conclusion": sentences(checks)[0],
         "works": all(check.works for check in checks),

@@ -77,7 +77,7 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
 def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
     """Return the middle line of a leaf that is deflected by the stroke, on paper.
 
-    `height` is that of its clamp, and `side` 1 or -1 the direction. Its ends are parallel.
+    `height` is the height of the leaf's clamp, and `side` (1 or -1) the direction. Both ends of the line are parallel.
     """
     s = np.linspace(0, 1, 33)
     x, z = (
@@ -90,7 +90,8 @@ def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
 def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str]:
     """Return a stop of the limiter, which belongs to the cart.
 
-    It lies one stroke away from the stage's clamp.
+    The stop lies one stroke away from the stage's clamp, to the `side` 1 or -1. The clamp's `edge` and the leaf's `end`
+    are on paper.
     """
     near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
     return [box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]

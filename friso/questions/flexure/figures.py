@@ -58,7 +58,10 @@ def _support(flexure: BothModels) -> Figure:
 
 
 def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]) -> Panel:
-    """Return the panel of one support stiffness [N/µm], which is equal on both sides."""
+    """Return the panel of one support stiffness [N/µm], which `of` reads from an evaluation.
+
+    The stiffness is equal for deflections to both sides.
+    """
     lines, points = _lines(flexure, of, _even_falling)
     top = 1.1 * max(float(line.y.max()) for line in lines)
     axis = Axis("Stiffness", "N/µm", (0.0, top), prefixed=False)
@@ -68,7 +71,10 @@ def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]
 def _lines(
     flexure: BothModels, of: Callable[[Evaluation], Array], smooth: Smooth
 ) -> tuple[tuple[Series, ...], Markers]:
-    """Return a quantity over the deflection as a line for each model, and the best one's points."""
+    """Return a quantity over the deflection as a line for each model, and the best one's points.
+
+    `of` reads the quantity from an evaluation, and `smooth` interpolates it between deflections.
+    """
     fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
         Series(

@@ -104,7 +104,7 @@ class PaperDrawing:
         return (low - left, high + right), self._upwards(row, 2), self._upwards(across, 1)
 
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
-        """Return how far a view reaches along its upward axis, below and above its origin [mm].
+        """Return how far a view reaches along `axis` (1: y, 2: z), below and above its origin [mm].
 
         It holds `half` to both sides, the marked points, and a part of the block.
         """

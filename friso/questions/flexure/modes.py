@@ -62,7 +62,10 @@ def modes_figure(evaluation: Evaluation) -> Figure:
 
 
 def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
-    """Return the panel of one mode, enlarged to be visible."""
+    """Return the panel of one mode, with the motion enlarged so that it can be seen.
+
+    `visible` is true if actuator and sensor both see the mode, which sets colour and label.
+    """
     view = best_view(mechanism, mode)
     axes = VIEWS[view]
     shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
@@ -131,9 +134,9 @@ def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
 
 
 def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
-    """Return the lines of the leaves in a view.
+    """Return the lines of the leaves in a view, at rest and moved.
 
-    They are middle lines from the side, outlines from above, and cross-sections along the leaves.
+    Leaves are middle lines if seen from the side, outlines from above, and cross-sections along their length.
     """
     draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
     return [
@@ -144,7 +147,7 @@ def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Sha
 
 
 def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    """Return the middle line of a leaf."""
+    """Return the middle line of a leaf at rest and moved; `offset` is the leaf's height z [m]."""
     x, leaf = _smooth(mechanism, leaf)
     return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
 
@@ -198,7 +201,10 @@ def _polyline(lines: list[Array]) -> tuple[Array, Array]:
 
 
 def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the limits of both axes around a drawing, with the usual aspect ratio."""
+    """Return the limits of both axes around a drawing that lies between `low` and `high`, (2,).
+
+    The aspect ratio of the panel is the usual one.
+    """
     width, height = high - low
     middle = (low + high) / 2
     half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2

@@ -69,7 +69,10 @@ def flexure(
 
 
 def _mechanism(stage: Stage, origin: str) -> Mechanism:
-    """Return the leaf springs of the stage. Raises InputError for a stage without [flexure]."""
+    """Return the leaf springs of the stage.
+
+    Raises InputError, which names the stage's `origin`, for a stage without [flexure].
+    """
     if stage.flexure is None:
         expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"
         raise InputError("flexure", "no [flexure]", expected, EXAMPLE, origin)

@@ -56,13 +56,16 @@ def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
 
 
 def path(points: Iterable[SheetPoint], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
-    """Return a line through points; `closed` joins its ends, and `fill` is its colour inside."""
+    """Return a line through points; `closed` joins its ends, and `fill` is its colour inside.
+
+    `kind` names the width and dashes of the line (`LINES`).
+    """
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in points)
     return f'<path d="M {corners}{" Z" if closed else ""}" fill={quoteattr(fill)} {LINES[kind]}/>'
 
 
 def box(corner: SheetPoint, other: SheetPoint, kind: str = "outline", fill: str = "none") -> str:
-    """Return a rectangle between opposite corners."""
+    """Return a rectangle between opposite corners; `kind` is that of its lines (`LINES`)."""
     (x1, y1), (x2, y2) = corner, other
     return path([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], kind, fill, closed=True)
 

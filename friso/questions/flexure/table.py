@@ -28,7 +28,7 @@ def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
 
 
 def newtons_per(value: float, length: str) -> str:
-    """Write a stiffness [N/m] per "mm" or "µm", as is usual for drives and for supports."""
+    """Write a stiffness [N/m] per `length`: "mm" for drives or "µm" for supports, as is usual."""
     return f"{_plain(value / {'mm': 1e3, 'µm': 1e6}[length])} N/{length}"
 
 
@@ -38,7 +38,7 @@ def megapascals(value: float) -> str:
 
 
 def margin_factor(value: float) -> str:
-    """Write a margin as a factor."""
+    """Write a margin as a factor: "2.5 times"; unknown if it is not finite."""
     return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
 
 
@@ -50,7 +50,7 @@ def _plain(value: float) -> str:
 def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
     """Return a row for each mode that a model knows, in the order of frequency.
 
-    The drive mode comes first.
+    The drive mode comes first: the stage moves along the direction in which it is driven.
     """
     named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}

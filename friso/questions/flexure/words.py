@@ -22,7 +22,7 @@ AGREE = 0.1
 
 
 def sentences(flexure: BothModels) -> list[str]:
-    """Return all sentences in order."""
+    """Return all sentences on the leaf springs: what they can do, warnings, and assumptions."""
     joint, *further = findings(flexure)
     return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
 
@@ -51,7 +51,7 @@ def warnings(flexure: BothModels) -> list[str]:
 
 
 def assumptions(stage: Stage) -> list[str]:
-    """Say what is assumed for keys that the stage file leaves out."""
+    """Say what is assumed for keys that the stage file leaves out; empty if it leaves out none."""
     flat = stage.flat()
     parts = []
     if "flexure.centre_x" not in flat:
@@ -139,7 +139,10 @@ def _borne(evaluation: Evaluation) -> list[str]:
 
 
 def _loaded(evaluation: Evaluation) -> list[str]:
-    """Say how a load along the leaves changes stiffness and drive mode."""
+    """Say how a load along the leaves changes stiffness and frequency in the drive direction.
+
+    The list is empty without a load.
+    """
     load = float(evaluation.mechanism.load)
     if not load:
         return []
@@ -157,9 +160,9 @@ def _loaded(evaluation: Evaluation) -> list[str]:
 
 
 def _breaks_away(flexure: BothModels) -> list[str]:
-    """Warn that the cart breaks away inside the stroke.
+    """Warn that the cart breaks away inside the stroke, because the leaves push too hard.
 
-    It does so if the leaves push harder than static friction holds.
+    The list is empty if static friction holds the cart, or is not known.
     """
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:
@@ -172,7 +175,7 @@ def _breaks_away(flexure: BothModels) -> list[str]:
 
 
 def _against(evaluation: Evaluation) -> list[str]:
-    """Warn of modes in which the sensor moves opposite to the actuator."""
+    """Warn of modes in which the sensor moves opposite to the actuator; empty without any."""
     modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
     if not modes:
         return []
@@ -185,7 +188,10 @@ def _against(evaluation: Evaluation) -> list[str]:
 
 
 def _differences(flexure: BothModels) -> list[str]:
-    """Say where the two models differ so much that the closed forms do not apply."""
+    """Say where the two models differ so much that the closed forms do not apply.
+
+    The list is empty if they agree, or if the beam model found no solution.
+    """
     if flexure.beams is None:
         return []
     shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
@@ -215,7 +221,7 @@ _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
 
 
 def _stroke(evaluation: Evaluation) -> str:
-    """Write the stroke in words."""
+    """Write the stroke with its unit: "a stroke of 1 mm"."""
     return f"a stroke of {with_unit(evaluation.stroke, 'm')}"
 
 

@@ -46,7 +46,7 @@ def identify_document(
 
 
 def _log(file: LogFile) -> dict[str, Any]:
-    """Return how a file was read, for the document."""
+    """Return for the document which kind of log a file holds and why, and what was read."""
     return {
         "file": str(file.path),
         "kind": file.kind,

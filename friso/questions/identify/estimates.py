@@ -1,4 +1,4 @@
-"""Estimates as they stand in the JSON document."""
+"""Convert estimates to what the JSON document holds of them."""
 
 from __future__ import annotations
 

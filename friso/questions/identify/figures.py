@@ -42,7 +42,7 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
 def _intervals(identification: Identification) -> list[Figure]:
     """Draw the half-width of every key's interval, relative to its value.
 
-    Without a value, it is relative to the middle of the interval.
+    For a key without a value, the half-width is relative to the middle of the interval.
     """
     bounded = [
         estimate

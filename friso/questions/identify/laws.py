@@ -36,7 +36,7 @@ def law_sentence(comparison: LawComparison) -> str:
 
 
 def _predict(laws: Sequence[LawPrediction]) -> str:
-    """Write "predicts" or "predict" for so many laws."""
+    """Return the verb for a number of laws: "predicts" for one, "predict" for several."""
     return "predicts" if len(laws) == 1 else "predict"
 
 
@@ -62,7 +62,7 @@ def how(comparison: LawComparison) -> str:
 
 
 def laws_document(comparison: LawComparison) -> dict[str, Any]:
-    """Return the compared laws, for the JSON document."""
+    """Return the friction laws compared, with errors and fitted keys, for the JSON document."""
     supported = [law.law for law in comparison.supported]
     return {
         "supported": supported,
@@ -88,7 +88,7 @@ def _error_share(prediction: LawPrediction) -> str:
 
 
 def _laws_with_errors(laws: Sequence[LawPrediction]) -> str:
-    """Write laws with their errors."""
+    """Write the names of some friction laws, each with the error of its prediction."""
     return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 

@@ -114,12 +114,12 @@ def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, .
 
 
 def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Series, ...]:
-    """Draw a signal as measured and as simulated."""
+    """Draw a signal over time as measured and as simulated; `word` names the simulated one."""
     return Series(time, measured, "measured", GREY, width=2.0), Series(time, simulated, word, VERMILLION, width=0.8)
 
 
 def _difference(time: Array, left: Array, unit: str) -> Panel:
-    """Draw the residual of a signal over time."""
+    """Draw the residual `left` of a signal, measured minus simulated [unit], over time [s]."""
     return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
@@ -182,7 +182,10 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
-    """Draw how much worse the fit becomes as one parameter is varied."""
+    """Draw how much worse the fit becomes as one parameter is varied.
+
+    The list is empty if that was not computed.
+    """
     best = moves.fit.cost
     parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
@@ -203,7 +206,11 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
-    """Draw how much worse the fit becomes as one parameter is varied."""
+    """Draw how much worse the fit becomes as one parameter is varied, over what is accepted.
+
+    `best` is the cost of the best fit. `fitted` is true if the fit could determine the parameter, which sets the
+    colour.
+    """
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))

@@ -71,9 +71,9 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Write an interval, such as "94.84 to 95.72 kg".
+    """Write the interval of an estimate, such as "94.84 to 95.72 kg".
 
-    For a value that the logs do not show, it is the range that they allow.
+    If the logs show no value, the range that they allow is written.
     """
     low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):
@@ -97,7 +97,7 @@ def with_interval(estimate: Estimate) -> str:
 
 
 def estimates_in_words(estimates: Sequence[Estimate]) -> str:
-    """Write several estimates in a sentence, by name."""
+    """Write several estimates in a sentence, each with its name, value and interval."""
     return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 
 
@@ -112,7 +112,7 @@ def digits(value: float, unit: str) -> str:
 def _scale(estimate: Estimate) -> tuple[float, str]:
     """Return the factor and the prefixed unit in which to write a value.
 
-    Without a value, they suit the range that is possible.
+    If there is no value, factor and unit suit the range that is possible.
     """
     finite = [estimate.low, estimate.high]
     if math.isfinite(estimate.value):  # for a value next to 0, the interval gives the scale

@@ -95,7 +95,10 @@ class IdentifyAnswer(Answer):
         return details(self.result, self.inputs)
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the command that checks the identified stage."""
+        """Return the command that checks the identified stage.
+
+        There is none without a stage file, or if the stage was checked already.
+        """
         if self.result.stage is None or not files or self.checked is not None:
             return []
         draws = " --draws 1000" if self.result.stage.uncertain() else ""
@@ -244,7 +247,7 @@ def _in_one_line(error: InputError) -> str:
 def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
     """Complete a stage file that lacks tables, from a stage `made` with assumed values.
 
-    Raises InputError.
+    The user's `changes` are made last. Raises InputError if the file or the changes make no usable stage.
     """
     try:
         return changed(completed(tables, made), changes_of(changes))
@@ -263,7 +266,10 @@ def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
-    """Say which tables the stage file lacks, and that a log or assumed values fill them."""
+    """Say which tables the stage file lacks, and that a log or assumed values fill them.
+
+    `made_up` lists their keys; without any, nothing is said.
+    """
     if not made_up:
         return []
     listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))
@@ -271,9 +277,9 @@ def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
 
 
 def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, period: TimeLike | None) -> AnalysisSettings:
-    """Return the user's choices for the analyses.
+    """Return the user's choices for the analyses, in SI.
 
-    Raises InputError.
+    Raises InputError for a text or number that is not usable.
     """
     values = []
     for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
@@ -303,9 +309,9 @@ def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
 
 
 def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
-    """Read the logs to be predicted.
+    """Return the logs to be predicted.
 
-    Raises InputError.
+    Raises InputError if one of the files holds a frequency response instead.
     """
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):

@@ -101,7 +101,7 @@ def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> A
 
 
 def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
-    """Draw a mass line over its band and an octave to each side."""
+    """Draw a mass line over its band and an octave to each side; the legend names it if `named`."""
     reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
     label = line.kind if named else ""
     return Series(reach, line.level.value / (2 * np.pi * reach) ** 2, label, INK, "dotted", 1.6)

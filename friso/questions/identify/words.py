@@ -74,7 +74,7 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _headline(identification: Identification) -> list[tuple[str, str]]:
-    """Say what is identified, before doubts are added."""
+    """Say what is identified, with doubts, and what is not; each sentence has a colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not _absent(estimate)]
@@ -124,7 +124,7 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate of bias or of viscous asymmetry may be zero."""
+    """Tell whether an estimate may be zero, and is of a bias or of viscous asymmetry."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
@@ -184,7 +184,7 @@ def _row(estimate: Estimate) -> EstimateRow:
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
-    """Return the experiments in words."""
+    """Return each experiment in words, then the comparison of friction laws if there is one."""
     several = zip(identification.experiments, labels(identification), strict=True)
     experiments = [_summary(experiment, label) for experiment, label in several]
     laws = identification.laws
@@ -196,7 +196,7 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
-    """Write an experiment in words."""
+    """Write an experiment in words, with the `label` from which its figures are named."""
     view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
     facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
     return ExperimentSummary(
@@ -209,7 +209,10 @@ def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
 
 
 def _used(logs: Sequence[Source]) -> Facts:
-    """Return a row on the samples used, if logs have gaps: those of the longest stretch without."""
+    """Return a row on how many samples were used, for logs with gaps; empty if no log has any.
+
+    Only the longest stretch without a gap is used.
+    """
     gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
     if not gapped:
         return ()
@@ -219,9 +222,9 @@ def _used(logs: Sequence[Source]) -> Facts:
 
 
 def labels(identification: Identification) -> list[str]:
-    """Return a name for every experiment, from which its figures are named.
+    """Return for every experiment a short label, with which the names of its figures begin.
 
-    The name is the kind, with a number if several experiments are of one kind.
+    The label is the kind of experiment, with a number if several are of one kind.
     """
     kinds = [experiment.kind for experiment in identification.experiments]
     return [

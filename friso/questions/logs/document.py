@@ -37,7 +37,7 @@ def _log(content: LogContent) -> dict[str, Any]:
 
 
 def _channel(channel: ChannelContent) -> dict[str, Any]:
-    """Return a channel, for the document."""
+    """Return a channel of a log for the document, such as its name, unit, role and range."""
     low, high = channel.range or (None, None)
     return {
         "name": channel.name,

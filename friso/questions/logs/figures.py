@@ -21,7 +21,7 @@ def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
 
 
 def _figure(content: LogContent, number: int) -> Figure:
-    """Draw the channels of one file."""
+    """Draw the channels of one file; `number` is that of the file, for the figure's name."""
     channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
     left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
     caption = f"As they stand in the file, in its own units.{left}"
@@ -44,9 +44,9 @@ def _panel(channel: ChannelContent) -> Panel:
 
 
 def _within_range(values: np.ndarray) -> np.ndarray:
-    """Return the values that a picture can show, which no instrument exceeds.
+    """Return the values that a picture can show, at most `largest_value` (a setting) in size.
 
-    Larger values become NaN, and values next to 0 become 0.
+    Larger values become NaN, and values smaller than its inverse become 0.
     """
     settings = LogSettings.current()
     sizes = np.abs(values)

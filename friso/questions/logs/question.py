@@ -36,7 +36,7 @@ class LogsAnswer(Answer):
         return str(unreadable(self.errors)) if self.errors else ""
 
     def files(self) -> Files:
-        """Return the page with its figures."""
+        """Return the page with its figures; nothing if no file could be read."""
         from friso.questions.logs.page import logs_files
 
         return logs_files(self.result) if self.result else {}

@@ -44,7 +44,7 @@ def next_steps(contents: Sequence[LogContent], files: Sequence[Path]) -> list[st
 
 
 def title(content: LogContent) -> str:
-    """Write the file and its format."""
+    """Write a file's name with its format in brackets."""
     return f"{content.path.name} ({content.title})"
 
 
@@ -130,7 +130,7 @@ def sparkline(values: np.ndarray) -> str:
 
 
 def _holds(content: LogContent) -> str:
-    """Say what a file holds."""
+    """Say how much a file holds: frequency lines, or channels, samples and duration."""
     if content.response is not None:
         frequency = content.response.frequency
         ends = range_with_unit(float(frequency[0]), float(frequency[-1]), "Hz")

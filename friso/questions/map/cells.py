@@ -109,7 +109,10 @@ class Look:
 
     @property
     def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Category, ...]]:
-        """Return everything that a map or a cloud needs for its colours."""
+        """Return what a panel of cells or of points needs for its colours.
+
+        These are quantity, unit, limits, whether the scale is logarithmic, colours of counts, and categories.
+        """
         return self.quantity, self.unit, self.limits, self.log, self.colours, self.categories
 
 
@@ -267,9 +270,9 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
 
 
 def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:
-    """Return the texts of a variable once each, and their indices in the order of `dims`.
+    """Return the index of each run's text, in the order of `dims`, and the texts once each.
 
-    The indices come first. A variable that the runs lack has a single text, None.
+    A variable that the runs lack has a single text, None.
     """
     if name not in runs:
         return np.zeros((), dtype=int), [None]

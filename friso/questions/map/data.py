@@ -41,8 +41,9 @@ NONE = 255  # code for a cell without a category, whose number counts
 def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
     """Return everything that the page's script reads, ready for JSON.
 
-    Arrays are base64 of little-endian numbers. They run cell by cell in the order of the axes, the last axis fastest.
-    `drawn` holds the runs of all cells. Raises ValueError for runs without axes, or without the metric.
+    Arrays are base64 of little-endian numbers, cell by cell in the order of the axes, the last axis fastest. `drawn`
+    holds the runs of all cells. `rerun` is the command that repeats a run. Raises ValueError for runs without axes, or
+    without the metric.
     """
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims
@@ -136,9 +137,10 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 
 
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an axis with its values, and the value there of the machine with the keys `flat`.
+    """Return an axis with its values at `positions`, the indices of the cells on the page.
 
-    The machine's value is null beyond the ends of the axis.
+    The value of the machine with the keys `flat` is added. It is null for an axis of words, and beyond the ends of the
+    axis.
     """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)

@@ -116,7 +116,8 @@ def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> 
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 
-    The curve runs half-way between cells of a map of verdicts. Maps with words on an axis have no such curve.
+    The curve runs half-way between cells of a map of verdicts, and may have several parts. The result is empty for
+    other metrics, for an axis with words or a single cell, and if all cells are on one side.
     """
     attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
     if min(codes.shape) < 2 or x.words or y.words or not attracted:
@@ -175,7 +176,10 @@ def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, fl
 
 
 def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
-    """Say which values of an axis have no panel."""
+    """Say which values of an axis have no panel; `indices` are those that have one.
+
+    The text is empty if all values have a panel.
+    """
     missing = [i for i in range(len(axis.places)) if i not in indices]
     if not missing:
         return ""

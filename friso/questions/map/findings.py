@@ -40,10 +40,10 @@ _QUIET = ("transient", "settles")
 
 
 def headline(runs: xr.Dataset, name: str) -> str:
-    """Return the first statement of a map: where, and in which fraction of it, its finding holds.
+    """Return the first statement on a map, such as in which fraction of it stages hunt.
 
-    The metric declares its findings (`Metric.findings`). Doubts follow the statement, which is empty if the runs have
-    no outcome.
+    The metric declares what is stated (`Metric.findings`). Doubts follow. The result is empty if the runs have no
+    outcome.
     """
     every = metrics()
     asked = name if name in runs and name in every and every[name].findings else ""
@@ -105,9 +105,10 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
 
 
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
-    """Mark the range of an axis in which a finding holds, from its first to its last cell.
+    """Mark the cells of an axis in the range in which a finding holds, shape (n,).
 
-    On an axis of words, only the words at which it holds are marked.
+    The range lasts from the first of the `cells` in which it holds to the last. On an axis of words, only words at
+    which it holds are marked.
     """
     held = axis.positions[cells]
     if axis.words:
@@ -175,7 +176,10 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
-    """Say in how many cells peak counts or verdicts disagree with the end of the run."""
+    """Say in how many cells peak counts or verdicts disagree with the end of the run.
+
+    The list is empty if there are no such cells, or the map lacks one of the two.
+    """
     if name in worded(verdicts=True) and name != "outcome" and {name, "outcome"} <= set(runs.data_vars):
         hidden = int(((runs[name].values == "hunts") & np.isin(runs["outcome"].values, (RESTS, CREEPS))).sum())
         text = (

@@ -111,7 +111,10 @@ class SweepAnswer(Answer):
         return texts if self.store is None else [*texts, f"store: {self.store}"]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """Return the command that runs the cell with the largest swing at its end."""
+        """Return the command that runs the cell with the largest swing at its end.
+
+        There is none for a map in memory, without a store.
+        """
         if self.store is None:
             return []
         swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)
@@ -409,7 +412,10 @@ def _filled(
     """Run the cells that a store lacks; return the runs, and whether the store can be written.
 
     If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is only read. With `beside`, it is refused, since the names of figures beside a store are noted in it.
+    is only read.
+
+    With `beside`, figures are written beside the store, which notes their names. Raises StoreError for a store that
+    must be written and cannot be.
     """
     stored = 0
 

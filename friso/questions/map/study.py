@@ -72,7 +72,8 @@ class Varied:
     ) -> Varied:
         """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-        Raises InputError.
+        `latin` and `log` say how keys are sampled and spaced. Raises InputError for an axis or a link that is not
+        usable.
         """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(
@@ -81,10 +82,9 @@ class Varied:
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
-    """Build the study that the options describe.
+    """Build the study that the options describe; `refine` makes its grid finer.
 
-    Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its
-    cost.
+    Raises InputError for unusable options, or for a study of more than `most` cells; the message then gives its cost.
     """
     settings = StudySettings.current()
     axes, links, samples = varied.axes, varied.links, varied.samples
@@ -133,7 +133,8 @@ def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Stu
 def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     """Return the study with all metrics of its store, if the store differs in nothing else.
 
-    Raises InputError if the store lacks some of the metrics asked for and must not be replaced.
+    Otherwise the study is returned as it is. Raises InputError if the store lacks some of the metrics asked for, unless
+    `overwrite` is set.
     """
     from friso.studies.store import read_store
     from friso.studies.store_folder import remove_leftovers
@@ -156,7 +157,7 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
 
 def coloured_by(study: Study, metric: str) -> str:
-    """Return the variable that colours the map: the metric, or the variable that it is shown as."""
+    """Return the variable that colours the map: the metric, or another that shows it."""
     other = metrics()[metric].shown_as
     return other if other in study.metrics else metric
 
@@ -211,7 +212,7 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     """Refuse to write over anything but earlier results of this study.
 
     If figure and page are written beside the store, `beside` is the example that a refusal shows. Raises InputError for
-    foreign files, and StoreError for a store with another study.
+    foreign files, and StoreError for a store with another study; `overwrite` allows both.
     """
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other

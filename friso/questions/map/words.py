@@ -120,7 +120,7 @@ def unit_of(array: xr.DataArray) -> str:
 
 
 def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
-    """Return a variable of texts as codes of its shape, and the texts that they stand for.
+    """Return a variable of texts as indices of its shape, and the texts to which these refer.
 
     Texts come in the order in which they occur.
     """

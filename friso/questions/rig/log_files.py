@@ -1,4 +1,4 @@
-"""Write the files of a rig's log: the drive's log, how to read it, and the truth behind it."""
+"""Write the files of a rig's log: the drive's log, how to read it, and the true signals."""
 
 from __future__ import annotations
 

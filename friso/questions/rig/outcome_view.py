@@ -55,5 +55,5 @@ def _lengths(outcome: Outcome) -> list[str]:
 
 
 def _records(outcome: Outcome) -> list[Figure]:
-    """Draw the signals of each log."""
+    """Draw the signals of each log over time, one figure per log."""
     return [log_figure(log.log, [*log.logged], f"rig_{log.name}") for log in outcome.logs]

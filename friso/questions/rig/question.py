@@ -1,4 +1,4 @@
-"""Rehearse an experiment on the machine as built, with its logs and the truth behind them."""
+"""Rehearse an experiment on the machine as built, with its logs and the true signals behind."""
 
 from __future__ import annotations
 

@@ -158,7 +158,7 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
 def _windows(tuning: Advice) -> list[Panel]:
     """Draw in which range each number of the least change still works, the others as tuned.
 
-    Ranges are given as factors of the tuned numbers.
+    Ranges are given as factors of the tuned numbers. The list is empty if no change works, or its ranges are not known.
     """
     least = tuning.least
     if least is None or not least.windows:

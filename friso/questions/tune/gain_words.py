@@ -19,7 +19,7 @@ def gain_lines(tuning: Advice) -> list[str]:
 
 
 def gain_facts(tuning: Advice) -> list[tuple[str, str]]:
-    """Return every remedy that works with its gains."""
+    """Return the name of every remedy that works, with its gains in words."""
     return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome, tuning))]
 
 

@@ -40,7 +40,7 @@ def as_it_is(tuning: Advice) -> str:
 
 
 def _missed(name: str, tuning: Advice) -> str:
-    """Say that the stage misses a part of the goal, and on which fraction of machines."""
+    """Say that the stage misses the part `name` of the goal, and on which fraction of machines."""
     present, goal = tuning.present, tuning.goal
     meets = present.meets(goal)
     every = np.all([*meets.values()], axis=0)

@@ -63,7 +63,7 @@ class TuneAnswer(Answer):
 
     @property
     def interrupted(self) -> bool:
-        """Tell whether the search was interrupted."""
+        """Tell whether Ctrl-C ended the search, so that the answer is the best so far."""
         return self.result.interrupted
 
     def details(self) -> Sequence[str]:
@@ -184,7 +184,10 @@ def _goal(
     only: Changeable | None,
     keep: Changeable | None,
 ) -> Goal:
-    """Build the goal from the options. Raises InputError for values that cannot be used."""
+    """Build the goal from the options, in SI.
+
+    Raises InputError for a value that cannot be used, and if nothing is left to change.
+    """
     for name, part in (("only", only), ("keep", keep)):
         if part is not None:
             choice(part, name, get_args(Changeable), f"{name}=controller")
@@ -213,7 +216,10 @@ def _goal(
 
 
 def _moves(text: str, stage: Stage) -> MoveRange:
-    """Read the range of moves, with the accelerations of [moves]. Raises InputError."""
+    """Read the range of moves FIRST..LAST, with the accelerations of [moves].
+
+    Raises InputError for a text without two lengths, or whose first length is the larger one.
+    """
     length, stated = Quantity("m", positive, "10 um").on(stage.axis_kind), MoveRange.of_stage(stage, 0.0)
     first, _, last = text.partition("..")
     largest = Quantity("m", positive, "32 mm").on(stage.axis_kind).example

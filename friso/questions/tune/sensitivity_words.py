@@ -12,12 +12,18 @@ MOST, LEAST = 4, 0.02
 
 
 def sensitivity_sentences(tuning: Advice) -> list[str]:
-    """Say how far 1 % of each key moves the edge of hunting of the stage as it is."""
+    """Say how far 1 % of each key moves the edge of hunting of the stage as it is.
+
+    The list is empty if derivatives of the edge were not computed.
+    """
     return ranked_sentences(tuning.sensitivities) if tuning.sensitivities else []
 
 
 def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
-    """Rank keys by how far 1 % of each moves the edge of hunting, the most important first."""
+    """Rank keys by how far 1 % of each moves the edge of hunting, the most important first.
+
+    The list is empty without an edge, and if no key moves it.
+    """
     ranked = sensitivities.ranked()
     if not ranked or ranked[0][1] == 0:
         return []

@@ -81,7 +81,7 @@ def time(seconds: float) -> str:
 
 
 def slowest_time(measured: Performance, goal: Goal) -> str:
-    """Write the time within which 95 % of the machines are in position, with its interval."""
+    """Write the time in which enough machines are in position (`goal.share`), with its interval."""
     low, high = measured.slowest_interval(goal)
     alone = time(measured.slowest(goal))
     if not math.isfinite(low):
@@ -158,7 +158,7 @@ def _in_short(tuning: Advice) -> Iterator[str]:
 
 
 def _for_all(tuning: Advice) -> str:
-    """Say that the least change holds for all moves, where another that works does not."""
+    """Say that the least change holds for all moves; empty unless another that works does not."""
     least = tuning.least
     every = least is not None and tuning.for_all_moves(least)
     return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
@@ -203,7 +203,7 @@ def unknown(tuning: Advice) -> list[str]:
 
 
 def goal_words(goal: Goal) -> str:
-    """Describe the goal in words."""
+    """Describe the goal: accuracy, time, moves, force, margins and bandwidth that are required."""
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
     most, moves = goal.bandwidth_limit, goal.moves
@@ -219,7 +219,7 @@ def goal_words(goal: Goal) -> str:
 
 
 def _interrupted(tuning: Advice) -> list[str]:
-    """Say that the search was interrupted and the answer is the best so far."""
+    """Say that the search was interrupted and the answer is the best so far; or say nothing."""
     if not tuning.interrupted:
         return []
     return [
@@ -228,7 +228,10 @@ def _interrupted(tuning: Advice) -> list[str]:
 
 
 def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
-    """Say what to set for a remedy, and what that brings and costs."""
+    """Say what to set for a remedy, and what that brings and costs.
+
+    `what` begins the first sentence, such as "The least change".
+    """
     assert outcome.stage is not None
     assert outcome.measured is not None
     return [
@@ -336,7 +339,10 @@ def _holds(measured: Performance, goal: Goal) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """Say what a remedy costs beside the stage as it is: force, margin and stiffness."""
+    """Say what a remedy costs beside the stage as it is: force, margin and stiffness.
+
+    If it `buys_joint`, the text adds that standstill was not computed.
+    """
     goal, before = tuning.goal, tuning.present
     force = _against(measured.force(goal), before.force(goal), "force", "N")
     resists = "stiffness against a load before the integral acts"
@@ -460,7 +466,7 @@ def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
-    """Return the keys whose values differ."""
+    """Return the keys of `before` that have another value in `after`."""
     return [key for key, value in before.items() if not np.array_equal(after[key], value)]
 
 
@@ -484,10 +490,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield first the part of the goal that no setting of a remedy meets.
+    """Yield sentences on why no setting of a remedy meets the goal; the first one is the reason.
 
-    Only settings that meet the parts before count. If some meet all parts, it says that none surely does on fresh
-    machines, or that it is not known whether they hunt.
+    Each names a part of the goal that no setting meets, of those that meet the parts before. If some settings meet all
+    parts, the sentence says that none surely does on fresh machines, or that it is not known whether they hunt.
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
@@ -521,7 +527,10 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
-    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone."""
+    """Write the lowest bandwidth of the settings that miss the goal by their bandwidth alone.
+
+    The text is empty if there is no such setting.
+    """
     others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
     lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
     return (
@@ -530,7 +539,10 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
 
 
 def _edges(tuning: Advice) -> str:
-    """Say at which bandwidth hunting ends, and up to which one there is enough margin."""
+    """Say at which bandwidth hunting ends, and up to which one there is enough margin.
+
+    A bandwidth that is not known is left out; if none is known, the text is empty.
+    """
     edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
     parts = []
     if edge is not None:
@@ -610,7 +622,10 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """Say in which range each number of the least change works, the others as tuned."""
+    """Say in which range each number of the least change works, the others as tuned.
+
+    The list is empty if no change works, or if it varies no number.
+    """
     least = tuning.least
     if least is None or not least.remedy.variables:
         return []
@@ -687,5 +702,5 @@ def sentences(tuning: Advice) -> list[str]:
 
 
 def tables(tuning: Advice) -> list[AnswerTable]:
-    """Return the table of remedies side by side."""
+    """Return the table in which remedies and the stage as it is stand side by side."""
     return [AnswerTable(tuning.stage.name, COLUMNS, rows(tuning))]

@@ -89,7 +89,7 @@ def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
 def _free(guideline: Guideline) -> Figure:
     """Draw the edge with a free joint of ample stroke over the joint's frequency.
 
-    Both are relative to the edge with the joint locked.
+    Edge and frequency are relative to the edge with the joint locked.
     """
     sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
     joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
@@ -212,9 +212,9 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 
 def _both(fit: Fit, which: object) -> Sweep:
-    """Return the samples that have an edge, fitted and held-out, for which `which` is true.
+    """Return the samples, fitted and held-out, that have an edge and are selected by `which`.
 
-    `which` takes the samples' groups.
+    `which` is a function from the samples' dimensionless groups to booleans, one for each sample.
     """
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 

@@ -128,8 +128,8 @@ def _one_window(sweep: Sweep) -> np.ndarray:
 def _worst(guideline: Guideline) -> dict[str, Any] | None:
     """Summarise the samples whose locked edge is far from the law, fitted and held out.
 
-    Returns how many there are, the least and largest of their groups gap and stribeck, and how many of each kind.
-    Returns None if there are none.
+    Returns their number, how many there are of each kind of edge, and the ranges of their dimensionless groups `gap`
+    and `stribeck`. Returns None if there are none.
     """
     used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
@@ -186,7 +186,7 @@ def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, 
 
 
 def edges_table(guideline: Guideline) -> str:
-    """Return all samples with their groups and edges, as CSV.
+    """Return all samples with their dimensionless groups and edges, as CSV.
 
     Numbers have four digits, more than the accuracy of an edge.
     """

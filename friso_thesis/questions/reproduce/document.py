@@ -101,7 +101,10 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
 
 
 def _ways(verdict: ClaimVerdict) -> dict[str, ClaimJudgement]:
-    """Return the judgement by the thesis's count and, if it matters, by the attractors."""
+    """Return how a claim is judged by the thesis's peak count and by what attracts the stages.
+
+    One of these is left out if it was not computed or does not matter.
+    """
     findings = {COUNT: verdict.finding, CYCLE: verdict.attracts}
     return {way: finding.judgement for way, finding in findings.items() if finding}
 

@@ -100,7 +100,10 @@ def _line(edge: Edge) -> Series:
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
-    """Return the maps of a study by title: one, or for Fig. 14B one per tolerance."""
+    """Return the maps of a study by title, which begins with the `letter` of their panel.
+
+    A study has one map, but that of Fig. 14B has one for each tolerance.
+    """
     if study.panel == "14B":
         return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}
     return {f"{letter}: {study.title}": reproduction.maps[study.name]}

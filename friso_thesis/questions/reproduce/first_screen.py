@@ -30,7 +30,7 @@ class Remark:
 
     @property
     def command(self) -> str:
-        """Return the command that shows more."""
+        """Return the command that judges the claim alone, and shows more about it."""
         return f"friso reproduce --only {self.claim}"
 
 
@@ -100,7 +100,7 @@ def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[
 
 
 def as_far(verdict: ClaimVerdict) -> str:
-    """Return in brackets how far a claim that holds could be judged; "" if all of it was."""
+    """Return a remark in brackets if some criterion of a claim is undecided; "" otherwise."""
     beyond = None in verdict.finding.pattern if verdict.finding else False
     return " (as far as simulation decides)" if beyond else ""
 

@@ -177,7 +177,7 @@ def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
 
 
 def _printed(figure: Figure) -> Markup:
-    """Return the figure for paper as a data address.
+    """Return the figure for paper as a data URL, which holds the whole image.
 
     Maps are drawn in pixels, because thousands of cells as lines would make megabytes.
     """

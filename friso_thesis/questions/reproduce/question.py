@@ -48,7 +48,7 @@ class ReproduceAnswer(Answer):
         ]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """Return the conclusions under each law."""
+        """Return the table of conclusions under each friction law; empty unless laws were asked for."""
         from friso_thesis.questions.reproduce.laws import TITLE, laws_rows
 
         return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []

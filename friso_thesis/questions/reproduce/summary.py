@@ -24,7 +24,10 @@ _BETWEEN = 0.6
 
 
 def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
-    """Write the summary sheet to a file. Raises OSError."""
+    """Write the summary sheet to a PDF file; raises OSError if that is not possible.
+
+    The `conclusion` stands at its head, and `colours` has a colour for each judgement.
+    """
     metadata = {"CreationDate": None, "Creator": None, "Producer": None}
     summary_sheet(verdicts, conclusion, colours).savefig(path, format="pdf", metadata=metadata)
 

@@ -52,7 +52,7 @@ def numbers(verdict: ClaimVerdict) -> str:
 
 
 def met(verdict: ClaimVerdict) -> str:
-    """Return how many criteria are met."""
+    """Return how many criteria of a claim are met; "" if the claim was not judged."""
     if verdict.finding is None:
         return ""
     decided = [holds for holds in verdict.finding.pattern if holds is not None]
@@ -60,7 +60,10 @@ def met(verdict: ClaimVerdict) -> str:
 
 
 def share(verdict: ClaimVerdict) -> str:
-    """Say for how many random choices of the open values a claim holds, with an interval."""
+    """Say for how many random choices of the open values a claim holds, with an interval.
+
+    The text is empty if no such choices were tried.
+    """
     if verdict.space is None:
         return ""
     space = verdict.space
@@ -80,17 +83,20 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return the word of agreement if attractors judge the claim; "" if that does not matter."""
+    """Return how far a claim agrees, in a word, if it is judged by what attracts the stages.
+
+    The result is "" if this was not computed or does not matter.
+    """
     return AGREEMENT[verdict.attracts.judgement] if verdict.attracts else ""
 
 
 def criterion_word(part: Part) -> str:
-    """Return the word that says how far a criterion agrees."""
+    """Return "agrees" or "does not agree" for a criterion, or "undecided"."""
     return "undecided" if part.undecided else "agrees" if part.holds else "does not agree"
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
-    """Return why a claim does not hold: the first sentence of each reason.
+    """Return why a claim does not hold: the first sentence of each reason; empty without any.
 
     For several criteria, each reason names the criteria to which it belongs. The rest is among the details.
     """
@@ -118,8 +124,8 @@ def _first_sentence(text: str) -> str:
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     """Return the texts below a figure or section, by name.
 
-    They are numbers and reasons that are shortened above, numbers by what attracts, draws that decide nothing, and what
-    another grid or tolerance changes.
+    The texts are numbers and reasons that are shortened above, numbers by what attracts the stages, and draws that
+    decide nothing. A last text says what another grid or tolerance changes.
     """
     parts = verdict.finding.stated if verdict.finding else ()
     rows = [
@@ -169,7 +175,7 @@ def open_rows() -> list[Sequence[str]]:
 def fit_sentence(plausible: Plausible) -> str:
     """Say which random choice of the open values fits the numbers printed in the thesis best.
 
-    friso's own choice counts too. The sentence also says which numbers these are.
+    friso's own choice counts too. The sentence also names the numbers compared. It is empty if no choice was compared.
     """
     fit = plausible.fit
     if fit is None:
@@ -191,7 +197,10 @@ def fit_sentence(plausible: Plausible) -> str:
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
-    """Return rows of numbers printed in the thesis, beside those of the best open values."""
+    """Return rows of numbers printed in the thesis, beside those of the best open values.
+
+    There are none if no choice of open values was compared.
+    """
     if plausible.fit is None:
         return []
     return [

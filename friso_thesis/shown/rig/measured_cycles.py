@@ -202,7 +202,7 @@ def _medians(values: np.ndarray) -> np.ndarray:
 def _by_asymmetry(result: CycleComparison) -> Figure:
     """Draw how often and how slowly cycles swing, over the asymmetry of friction.
 
-    It is the difference of static friction, in the logarithm, between both sides of the target.
+    Asymmetry is the difference of static friction, in the logarithm, between both sides of the target.
     """
     size, slow = np.abs(result.asymmetry).ravel(), result.slower(result.field).ravel()
     alive = np.isfinite(slow)

@@ -54,7 +54,7 @@ def _needed(counts: StrokeCrossover) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw the map of the experiment."""
+    """Draw the map of rails with counted peaks, over stroke and crossover."""
     counts: StrokeCrossover = outcome.result
     finite = np.isfinite(counts.limits) & (counts.limits > 0)
     border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
@@ -77,7 +77,7 @@ def rails_panel(counts: StrokeCrossover) -> Panel:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """Return all results for the JSON document.
 
-    Arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers).
+    Arrays have the shape (strokes, crossovers, rails), and fractions of rails (strokes, crossovers).
     """
     counts: StrokeCrossover = outcome.result
     shares = [

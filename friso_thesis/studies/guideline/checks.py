@@ -69,7 +69,8 @@ _Begins = Callable[[Ensemble, np.ndarray, int], Begin]
 def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tuple[np.ndarray, np.ndarray]:
     """Simulate samples with their crossover at `share` times their edge, `tried` times each.
 
-    Returns which runs still swing at the end, and which were completed, both of shape (samples, tried).
+    `begin` makes the starts of all runs. Returns which runs still swing at the end, and which were completed, both of
+    shape (samples, tried).
     """
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)
@@ -84,7 +85,11 @@ def _stuck(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
 
 
 def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
-    """Return moves there and back whose sizes and times are a Sobol sample."""
+    """Return moves there and back whose sizes and times are a Sobol sample.
+
+    `count` samples make the same moves. Sizes are multiples of each stage's own length scale (`stages.length`), and
+    times of the inverse of its `crossover`.
+    """
     ends = np.log([SIZES, TIMES]).T
     size, time = np.exp(qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *ends)).T
     duration = np.tile(time, count) / crossover

@@ -61,7 +61,7 @@ def judged_claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
 
 
 def _gap(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that hunting needs a friction gap of about 1 N."""
+    """Judge the claim that hunting needs a friction gap F_s - F_c of about 1 N."""
     cases = worked.studies["gap"]
     forces = sorted({case.changes["friction.static"] for case in cases})
     gaps = [least_gap(cases, force) for force in forces]
@@ -77,7 +77,7 @@ def _gap(worked: Worked) -> GuidelineClaim:
 
 
 def _share_below_limit(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that the mass ratio does not affect the isolator."""
+    """Judge the claim that the ratio of cart and stage mass does not affect the isolator."""
     cases = worked.studies["share"]
     edges = _computed(cases)
     at = [STUDIED["share"](case.changes) for case in cases]
@@ -95,7 +95,7 @@ def _share_below_limit(worked: Worked) -> GuidelineClaim:
 
 
 def _mass(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that more mass helps."""
+    """Judge the claim that more mass ends hunting at a lower crossover."""
     cases = worked.studies["mass"]
     edges = _computed(cases)
     at = [STUDIED["mass"](case.changes) for case in cases]
@@ -116,7 +116,7 @@ def _stiffness(worked: Worked) -> GuidelineClaim:
 
 
 def _stroke(worked: Worked) -> GuidelineClaim:
-    """Judge the claim that a small stroke is enough, and that longer ones change nothing."""
+    """Judge the claim that a small stroke is enough, and that a longer one changes nothing."""
     cases = {round(1e3 * STUDIED["stroke"](case.changes), 6): case for case in worked.studies["stroke"]}
     words = ", ".join(f"{_edge(case)} at {stroke:g} mm" for stroke, case in cases.items())
     short, long, longest = (cases[stroke].ranked for stroke in STROKES)
@@ -204,16 +204,17 @@ class LeastGap:
         return f"{self.low:.2g} N" if np.isfinite(self.high) else f"more than {self.low:.2g} N, the largest tried,"
 
     def within(self, least: float, most: float) -> bool | None:
-        """Tell whether the gap lies in a range; None if that is unknown."""
+        """Tell whether the gap lies from `least` to `most` [N]; None if that is unknown."""
         if self.high < least or self.low > most:
             return False
         return True if least <= self.low and self.high <= most else None
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """Return the smallest friction gap F_s - F_c with which the rig hunts at `CLAIMED_AT`.
+    """Return the smallest friction gap F_s - F_c [N] with which the rig hunts at `CLAIMED_AT`.
 
-    It is given for a static friction [N], and interpolated linearly between the points of the edge, in logarithms.
+    The gap holds for a `static` friction [N]. It is interpolated linearly, in logarithms, between the points of the
+    edge.
     """
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)

@@ -99,9 +99,9 @@ class Fit:
 class Guideline:
     """All results of the guideline, as in `docs/evidence/guideline.md`.
 
-    They are the number of groups by part of the stage, both laws, the worked steps, and what a parasitic mode allows.
-    Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps came from an
-    interrupted run.
+    They are the number of dimensionless groups by part of the stage, both laws, the worked steps, and what a parasitic
+    mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps
+    came from an interrupted run.
     """
 
     samples: int
@@ -117,7 +117,8 @@ class Guideline:
     def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
         """Return the errors of a law on the held-out samples selected by `which`, shape (count,).
 
-        Returns None if no sample is selected.
+        If `free`, the law is that of the free joint, otherwise that of the locked one. Returns None if no sample is
+        selected.
         """
         held = (self.free if free else self.locked).test.usable
         subset = held.take(which(held))
@@ -134,8 +135,8 @@ class Guideline:
 class ByRates:
     """Errors of the locked law on held-out samples whose ratio of rates lies in a range.
 
-    The ratio is the frequency at which the bearing slips over that at which falling friction drives the mass away. It
-    is at least `low` and below `high`. The errors are None without samples.
+    The ratio has the frequency at which the bearing slips over the one at which falling friction drives the mass away.
+    The range goes from `low` to below `high`. The errors are None without samples.
     """
 
     low: float
@@ -158,8 +159,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 def safe_over_friction(locked: Fit) -> float:
     """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    Each range of the ratio of the law's two rates has its own factor. It is the largest of the ranges in which the rig
-    may lie.
+    A factor belongs to each range of the ratio of the law's two rates. The largest factor of all ranges in which the
+    rig may lie is returned.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
@@ -213,9 +214,9 @@ def checked_samples(samples: int) -> None:
 
 
 def group_counts() -> dict[str, Count]:
-    """Return the numbers of parameters and groups of the rigid rig, with joint, and with mode.
+    """Return the numbers of parameters and dimensionless groups of three structures, by name.
 
-    The mode is the parasitic one.
+    They are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
     """
     return {
         "rigid": group_count(plain_rig()),
@@ -235,7 +236,7 @@ def _sizes(samples: int) -> dict[str, int]:
 
 
 def _steps(sizes: Mapping[str, int]) -> int:
-    """Return the number of progress steps of all sweeps.
+    """Return the number of progress steps of all sweeps; `sizes` are their samples by name.
 
     A sample with a free joint is also computed with the joint locked.
     """
@@ -244,7 +245,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 
 
 def _compile() -> None:
-    """Compile all equations that are needed, in parallel."""
+    """Compile the equations of all stages that the guideline needs, in parallel."""
     flats = (plain_rig(), plain_rig("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
     kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 

@@ -102,7 +102,7 @@ class _AtCrossovers:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
-    """Search stages for attractors at some crossovers.
+    """Search the stages with indices `which` for attractors, each at one crossover.
 
     Where an orbit may exist but could not be closed, a long simulation shows whether the stage keeps hunting.
     """

@@ -81,7 +81,10 @@ class Group:
     part: str = "stage"
 
     def of(self, flat: Mapping[str, Any]) -> Any:
-        """Return the group's value for stages, given by keys [SI] with numbers or arrays."""
+        """Return the value of this dimensionless group for stages.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
         value = self.factor
         for name, power in self.powers.items():
             parameter = PARAMETERS[name]
@@ -180,7 +183,7 @@ _UNIT = GroupScale()
 
 @dataclass(frozen=True)
 class Count:
-    """Numbers of parameters and groups of a structure, and the rank of the dimensions."""
+    """Number of parameters of a structure, and the rank of their dimensions."""
 
     parameters: int
     rank: int
@@ -217,14 +220,18 @@ def _powers(unit: str) -> tuple[float, float, float]:
 
 
 def group_count(flat: Mapping[str, Any]) -> Count:
-    """Return how many groups govern stages with the structure of the given one."""
+    """Count the parameters of a stage's structure, and the rank of their dimensions.
+
+    Their difference is the number of dimensionless groups. Only the structure counts, such as whether there is a joint,
+    not the values of the keys `flat`.
+    """
     names = group_parameters(flat)
     matrix = np.stack([dimensions(name, flat) for name in names])
     return Count(len(names), int(np.linalg.matrix_rank(matrix)))
 
 
 def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the groups of stages, given by keys [SI] with numbers or arrays.
+    """Return the dimensionless groups of stages, given by keys [SI] with numbers or arrays.
 
     Only groups of the stage's own parts are returned. Raises InputError for a stage without LuGre friction or without
     van Dijk's rules.

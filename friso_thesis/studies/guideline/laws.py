@@ -50,8 +50,8 @@ SampleValues = Mapping[str, np.ndarray]
 class Rate:
     """A frequency that enters a law of the edge, in units of sqrt(sigma_0/m).
 
-    It is a factor times groups to the fixed powers of `base`, times further groups over their references to fitted
-    powers. Powers are fitted only for those `candidates` that turn out to matter.
+    It is a factor times dimensionless groups to the fixed powers of `base`, times further groups over their references
+    to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Rate:
     candidates: tuple[str, ...]
 
     def fixed(self, values: SampleValues) -> np.ndarray:
-        """Return the logarithm of the product of groups to fixed powers, shape (count,)."""
+        """Return the logarithm of the product of dimensionless groups to fixed powers, (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
 
@@ -88,7 +88,8 @@ class FittedLaw:
     """A law of the edge with its numbers.
 
     `factors` belong to the frequencies (rates) that enter it. `exponents` are those fitted, in the order in which they
-    were chosen. `path` is the cross-validated loss (see `loss`) with no exponent, one, two, and so on.
+    were chosen. `path` has the cross-validated loss, a mean error of the logarithm, with no exponent, one, two, and so
+    on.
     """
 
     law: EdgeLaw
@@ -97,7 +98,10 @@ class FittedLaw:
     path: tuple[float, ...] = ()
 
     def of(self, rate: int) -> dict[str, float]:
-        """Return the fitted exponents of one of the law's frequencies, by group."""
+        """Return the fitted exponents of one of the law's frequencies, by dimensionless group.
+
+        `rate` is the index of the frequency.
+        """
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
     def log_rates(self, values: SampleValues) -> np.ndarray:
@@ -109,9 +113,9 @@ class FittedLaw:
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
     def edge(self, values: SampleValues, locked: np.ndarray | None = None) -> np.ndarray:
-        """Return the edge of stages with these groups, in units of sqrt(sigma_0/m).
+        """Return the edge of stages by their dimensionless groups, in units of sqrt(sigma_0/m).
 
-        `locked` is the edge with the joint locked.
+        `locked` is the edge with the joint locked, which only the law of the free joint needs.
         """
         rates = self.log_rates(values)
         return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])
@@ -196,7 +200,7 @@ def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.nd
 
 
 def loss(off: np.ndarray) -> float:
-    """Return the size of errors of the logarithm: the rms if they are small.
+    """Return the size of errors `off` of the logarithm: nearly the rms if they are small.
 
     Errors beyond `SCALE` count linearly.
     """
@@ -213,8 +217,8 @@ def _validated(
 ) -> float:
     """Return the cross-validated loss of a law with some exponents `chosen`.
 
-    Each part of the samples, numbered in `folds`, is predicted by the law fitted to the others. `target` are logarithms
-    of edges, and `offset` those of the locked joint.
+    Each part of the samples, numbered in `folds`, is predicted by the law fitted to the other parts. `target` are
+    logarithms of edges, and `offset` are logarithms of edges with the joint locked.
     """
     off = np.empty(len(target))
     for fold in range(FOLDS):
@@ -230,7 +234,7 @@ def _log_coefficients(
 ) -> np.ndarray:
     """Fit a law: return the logarithms of its factors, followed by the exponents `chosen`.
 
-    `target` are logarithms of edges, and `offset` those of the locked joint.
+    `target` are logarithms of edges, and `offset` are logarithms of edges with the joint locked.
     """
     features = _features(law, chosen, values)
     fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])

@@ -57,7 +57,10 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
-    """Return which stages still swing at the end, and which runs were completed, both (count,)."""
+    """Return which stages still swing at the end, and which runs were completed, both (count,).
+
+    After the motion is over, runs last as long as `periods` periods of a slow cycle.
+    """
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = RunOptions(
@@ -82,7 +85,8 @@ def swings_from_any_distance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which stages swing for ever from any of the distances, and for which this is known.
 
-    Both have the shape (count,). If a run of a stage failed, and no other run keeps swinging, it is unknown.
+    Both have the shape (count,). Simulations last `periods` periods of a slow cycle. If a run of a stage failed,
+    and no other run keeps swinging, it is unknown.
     """
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)

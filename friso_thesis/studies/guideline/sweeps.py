@@ -62,7 +62,7 @@ LOCKED_FIT, LOCKED_TEST, FREE_FIT, FREE_TEST = 1, 2, 3, 4
 
 @dataclass(frozen=True)
 class Sweep:
-    """Samples, which are stages given by their groups, and their edges of hunting.
+    """Samples, which are stages given by their dimensionless groups, and their edges of hunting.
 
     `values` are the groups, each of shape (count,), and contain the crossover at the edge (in units of sqrt(sigma_0/m),
     NaN without an edge). `locked` (count,) is the edge of the same stage with its joint locked (rigid).
@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def edge(self) -> np.ndarray:
-        """Return the edges of the samples."""
+        """Return the crossovers at the edges, in units of sqrt(sigma_0/m); NaN without an edge."""
         return self.edges.crossover
 
     @property
@@ -102,7 +102,7 @@ class Keep(KeptWork):
     sources = ("../friso_thesis/studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
-        """Return the part with this name, from the folder or else computed now and saved."""
+        """Return the part of a sweep with this name from the folder; otherwise `make` and save it."""
         columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
         return Edges(**columns)
 
@@ -112,14 +112,14 @@ def _columns(edges: Edges) -> dict[str, np.ndarray]:
 
 
 def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
-    """Return Sobol samples of a box, by group, each of shape (count,)."""
+    """Return Sobol samples in the ranges `box`, by dimensionless group, each of shape (count,)."""
     points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(np.array(list(box.values()))).T
     return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
-    """Return the edges of samples of rigid masses.
+    """Return the edges of `count` samples of rigid masses; finished parts are stored by `keep`.
 
     A locked joint is almost a rigid mass: it differs only by the contact of its fixtures.
     """
@@ -130,7 +130,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 
 
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
-    """Return the edges of samples with a free joint, and of all samples with locked joints.
+    """Return the edges of samples with a free joint, and of all `count` with locked joints.
 
     The first result has only samples with a locked edge, because the frequency of the joint is chosen relative to it.
     """

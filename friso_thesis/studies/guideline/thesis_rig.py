@@ -41,7 +41,7 @@ class ThesisCase:
     def ranked(self) -> float:
         """Return the computed edge [Hz] for comparisons.
 
-        It is 0 if it lies below the crossovers tried, infinite if above, and NaN if unknown.
+        The result is 0 if the edge lies below the crossovers tried, infinite if above, and NaN if unknown.
         """
         return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
 

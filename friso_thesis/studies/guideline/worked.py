@@ -60,10 +60,11 @@ class WorkedMachine:
 class WorkedDesign:
     """An isolator for a crossover limit [Hz].
 
-    `aim` [Hz] is the edge for which the law designs it. It has a stiffness [N/m], the stroke that it needs [m], and the
-    `force` at full stroke [N]. `cases` are its edges over the friction range. `margin` is the least modulus margin at
-    the limit, in the limit cases and in all states stuck under a bias force. It holds for the rig's own friction and
-    parasitic mode.
+    The law designs it for the edge `aim` [Hz]. The isolator has a stiffness [N/m], the stroke that it needs [m], and
+    the `force` at full stroke [N]. `cases` are its edges over the friction range.
+
+    `margin` is the least modulus margin at the limit, in the limit cases and in all states stuck under a bias force.
+    The margin holds for the rig's own friction and parasitic mode.
     """
 
     limit: float
@@ -97,8 +98,8 @@ class WorkedDesign:
 class IsolatorNeed:
     """Whether a machine with a crossover limit [Hz] needs an isolator.
 
-    It does if the limit is below `edge` [Hz], the highest locked edge by the law over the friction range, multiplied by
-    its safety factor.
+    An isolator is needed if the limit is below `edge` [Hz]. This is the highest locked edge by the law over the
+    friction range, multiplied by its safety factor.
     """
 
     limit: float
@@ -146,9 +147,9 @@ def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
 
 
 def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
-    """Work through the steps with given laws.
+    """Work through the steps from a crossover limit to an isolator, with the laws given.
 
-    Crossovers are kept above the laws by the safety factors.
+    Crossovers are kept above the laws' edges by the safety factors `safe_locked` and `safe_free`.
     """
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
@@ -195,10 +196,11 @@ def highest(laws: Laws) -> float:
 
 
 def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
-    """Design isolators until their computed edges are below the limit.
+    """Design isolators until their computed edges are below the limit, at most `CORRECTED`.
 
     The first is designed by the law, with its edge a safety factor below the limit. As long as computed edges are above
-    the limit, another follows with the aim lowered by that ratio, or by `BLIND` or more if an edge is unknown.
+    the limit, another isolator follows. Its aim is lower by the ratio of limit to edge, and by `BLIND` or more if an
+    edge is unknown. A factor `CLOSER` lowers it further.
     """
     designs = [_design(laws, limit, limit / safe)]
     while not designs[-1].does and len(designs) < CORRECTED:
@@ -208,9 +210,10 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
 
 
 def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
-    """Design a joint whose edge by the law stays below the aim, over the friction range.
+    """Design a joint whose edge by the law stays below `aim` [Hz], over the friction range.
 
-    Its stiffness is nine tenths of the largest possible one, and its stroke the smallest possible.
+    Its stiffness is nine tenths of the largest possible one, and its stroke the smallest possible. `limit` [Hz] is the
+    machine's highest crossover.
     """
     forces = friction_range(DESIGN_GAPS)
     base: dict[str, Any] = plain_rig("joint")

@@ -89,7 +89,7 @@ class InPosition:
     louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
 
     def ratio(self, source: str) -> float:
-        """Return the RMS with the joint free over the RMS with it locked."""
+        """Return the RMS with the joint free over the RMS with it locked, for one `source`."""
         return float(self.runs["free", source].true[0, 0] / self.runs["locked", source].true[0, 0])
 
     @property
@@ -186,9 +186,9 @@ def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:
-    """Return the drive's keys that switch off the encoder's noise and resolution.
+    """Return the drive's keys that switch off the encoder's noise and resolution, with value 0.
 
-    Both stay on for their own source, and for all sources together.
+    The result is empty if the `source` of the disturbance is the encoder or all sources together, or without a drive.
     """
     if source in ("encoder", "all") or stage.drive is None:
         return {}

@@ -312,7 +312,10 @@ def _trace(stage: Stage, seed: int) -> Trace:
 def _logged_machines(
     stage: Stage, seed: int, slowest: tuple[float, float, float] | None
 ) -> list[tuple[str, Stage, int]]:
-    """Return name, stage and noise seed of each log."""
+    """Return name, stage and noise seed of each log: on an even rail, and on a varied one.
+
+    `slowest` has the deviation, length [m] and seed of the rail with the slowest cycle; None: there is none.
+    """
     even = on_rail(stage)
     first = even.flat()["rail.seed"]
     machines = [("measured_cycles_even_rail", even, seed)]

@@ -61,10 +61,10 @@ class StrokeCrossover:
 
     @property
     def limits(self) -> np.ndarray:
-        """Return for each stroke the crossover [Hz] up to which any rail has counted peaks.
+        """Return the crossover [Hz] up to which any rail has counted peaks, for each stroke.
 
-        The shape is (strokes,). The limit lies halfway to the next crossover tried. It is 0 if no rail has any, and
-        infinite if some have at the highest.
+        The shape is (strokes,). The limit lies halfway to the next crossover tried. It is 0 if no rail has peaks at any
+        crossover, and infinite if some rail has peaks at the highest.
         """
         limits = np.zeros(len(self.strokes))
         for row, counted in enumerate(self.share > 0):

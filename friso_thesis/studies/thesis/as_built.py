@@ -132,7 +132,7 @@ def _prescribed(stage: Stage) -> Stage:
 
 
 def rig_with_drive(stage: Stage) -> Stage:
-    """Return the rig with its drive."""
+    """Return the rig with the keys of its real drive, such as sampling and delay."""
     return stage.replace(dict(AS_BUILT))
 
 
@@ -186,8 +186,8 @@ def standstill(stage: Stage) -> InPosition:
 class RailTraces:
     """Positions over time in single moves, on one rail that varies and on an even one.
 
-    They are less the end of the move [m], each of shape (n,), at times [s], shape (n,). `moves` has them by the joint's
-    state and crossover [Hz], and `rails` by rail. `distance` [m] is the length of the move.
+    Positions [m] are relative to the end of the move, each of shape (n,), at times [s], shape (n,). `moves` has them by
+    the joint's state and crossover [Hz], and `rails` by rail. `distance` [m] is the length of the move.
     """
 
     time: np.ndarray
@@ -217,10 +217,12 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 class RigLoops:
     """Open loops and masses of the rig, as measured with its real drive.
 
-    `locked` has the loops at several settings of the crossover, and `free` that at the lowest of these; `plant` is that
-    of the free joint. With the joint free, the `settings` [Hz], shape (n,), were tried; `stable` is true where the loop
-    was. `apparent` are masses [kg], shape (2, ratios), locked and free, for motors with the RATIOS of the force
-    assumed.
+    `locked` has the loops tuned to several crossovers. `free` is the loop with a free joint at the lowest of them, and
+    `plant` is its plant. With the joint free, the crossovers `settings` [Hz], shape (n,), were tried; `stable` is true
+    where the loop was.
+
+    `apparent` are masses [kg] that the rig seems to have, shape (2, ratios), locked and free. Its motor then gives
+    `RATIOS` of the force that is assumed.
     """
 
     locked: tuple[MeasuredLoop, ...]

@@ -96,7 +96,7 @@ class FindingTable:
 
 @dataclass(frozen=True)
 class Finding:
-    """Result of judging a claim, with a table of numbers if there is one."""
+    """What a judge finds on a claim: its parts, and a table of numbers if there is one."""
 
     parts: tuple[Part, ...]
     table: FindingTable | None = None
@@ -143,10 +143,10 @@ class Response:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence that a judge may use.
+    """Evidence that a judge, a function that judges a claim, may use.
 
-    It has maps by study name, responses by name, the linear analysis of the rig, and its identification by experiments,
-    each None if not made. It also has the rig itself.
+    Evidence has maps by study name, responses by name, the linear analysis of the rig, and its identification by
+    experiments, each None if not made. The rig itself is included, too.
     """
 
     maps: Mapping[str, xr.Dataset]
@@ -211,9 +211,9 @@ def judges(
 
 
 def registered() -> Mapping[str, Registered]:
-    """Return the judges by claim.
+    """Return the judges, which are functions that judge a claim, by the name of the claim.
 
-    They come from `friso_thesis.studies.thesis.judges`, and from later registrations.
+    They are declared in `friso_thesis.studies.thesis.judges`, or were registered later.
     """
     import friso_thesis.studies.thesis.judges  # noqa: F401 (registers them)
 

@@ -36,8 +36,8 @@ SMALLEST = 1e-3
 class Edge:
     """A curve in a map of two keys on which a cycle stops attracting.
 
-    It has a kind, whether the cycle is the symmetric one, and its points [SI] along the two axes of the map, shape
-    (points,) each.
+    The curve has a kind, and its points [SI] along the two axes of the map, shape (points,) each. It also says whether
+    the cycle is the symmetric one.
     """
 
     kind: Bifurcation
@@ -92,7 +92,7 @@ class Surveyed:
 def cells_apart(runs: xr.Dataset, edges: Sequence[Edge]) -> np.ndarray:
     """Return the distances of a map's cells from the nearest of some curves, in cells.
 
-    They have the shape of the runs, and are infinite without a curve.
+    The result has the shape of the runs, and is infinite without a curve.
     """
     axes = [runs[name].values for name in runs.dims]
     rows, columns = np.meshgrid(*(np.arange(len(axis), dtype=float) for axis in axes), indexing="ij")
@@ -134,7 +134,10 @@ def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
-    """Survey what attracts the stages of a map."""
+    """Survey evenly spread cells of a map for anything that attracts their stages.
+
+    Results in `kept` are not computed again.
+    """
     coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
     axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
     flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))

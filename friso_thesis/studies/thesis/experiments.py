@@ -199,7 +199,7 @@ class Experiments:
 
     @property
     def standstill(self) -> InPosition:
-        """Return the rig at a standstill (Fig. 28)."""
+        """Return the motion of the rig at a standstill under several disturbances (Fig. 28)."""
         return self._result(STANDSTILL)
 
     @property
@@ -217,7 +217,10 @@ class Experiments:
 
 @lru_cache(maxsize=64)
 def _experiment(name: str, stage_file: str) -> Any:
-    """Return an experiment, cached for the judges of several claims."""
+    """Run an experiment by its name on the stage in the text of a stage file.
+
+    The result is cached for the judges of several claims.
+    """
     return _RUNS[name](loads(stage_file))
 
 
@@ -287,7 +290,7 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
 def _lively_rail(moves: MovesOnRails) -> int:
     """Return the number of the first rail with peaks at the lowest crossover, joint locked.
 
-    It is the first rail if there is none.
+    If no rail has any, the result is the first rail.
     """
     return int(np.argmax(moves.locked.counted[0]))
 

@@ -54,7 +54,10 @@ class Kept(KeptWork):
     sources = SOURCES
 
     def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-        """Return the runs of a study, from the folder or computed now."""
+        """Return the runs of a study from the folder; otherwise `make` and save them.
+
+        `verify` is the fraction of the cells that has to be run again more accurately.
+        """
         axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
         file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
         columns = None if file is None else kept_arrays(file)
@@ -71,11 +74,14 @@ class Kept(KeptWork):
         return runs
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
-        """Return arrays saved under `about`, or computed now."""
+        """Return arrays saved under `about`; otherwise `make` and save them."""
         return self.arrays(("flags", *about), make)
 
     def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
-        """Return a result of a kind (see `taken_apart`), saved under `about` or computed now."""
+        """Return a result of a kind saved under `about`; otherwise `make` and save it.
+
+        Kinds that can be saved are listed at `taken_apart`.
+        """
         file = self._file("npz", "result", *about)
         columns = None if file is None else kept_arrays(file)
         if columns is not None:
@@ -87,7 +93,7 @@ class Kept(KeptWork):
         return made
 
     def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
-        """Return the findings saved under `about`, or computed now."""
+        """Return the findings saved under `about`; otherwise `make` and save them."""
         file = self._file("json", "findings", *about)
         if file is not None and (kept := kept_findings(file)) is not None:
             return kept

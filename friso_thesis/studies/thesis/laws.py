@@ -108,8 +108,8 @@ def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response],
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
     """Return the rig converted to a law, as far from the rig as measurements allow.
 
-    If all its measurements are nearly those of the rig, values that they leave open are moved to the upper end of what
-    they allow.
+    `conversion` is the converted rig. If measurements hardly tell it from the rig, values that they leave open are
+    moved to the upper end of what they allow.
     """
     same = all(change.off <= change.allowed / 10 for change in conversion.compared)
     if not same:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return values of rows and columns [SI], which runs keep moving, and which are valid.
 
-    The latter two are booleans of shape (rows, columns). The criterion for moving is an attribute of the runs: the
-    thesis's count, or the end of the run.
+    The last two results are booleans of shape (rows, columns). The criterion for moving is an attribute of the runs:
+    the thesis's count, or the end of the run.
     """
     moving, outcome = (runs[name].transpose(rows, columns).values for name in ("keeps_moving", "outcome"))
     valid = (outcome != "invalid") & (outcome != FAILED)
@@ -41,9 +41,10 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """Return, for each column of `moving`, (n, columns), where runs stop moving.
 
-    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is where the
-    `size` of the swings, interpolated in its logarithm, is 1. It is halfway between both if sizes are unknown, lie on
-    one side, or nothing is left of the swing beyond. If the limit is outside the range, it is the end of the range.
+    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is the value
+    at which the `size` of the swings, interpolated in its logarithm, is 1. The limit is halfway between both values if
+    sizes are unknown, lie on one side of 1, or nothing is left of the swing beyond. A limit outside the range becomes
+    the end of the range.
     """
     last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
     after = np.minimum(last + 1, len(values) - 1)
@@ -61,7 +62,8 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
 def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """Return for each column of `moving`, (n, columns), below which value no run keeps moving.
 
-    `values` ascend, shape (n,). Limits are interpolated by the `size` of swings (see `ends`).
+    `values` ascend, shape (n,). With the `size` of swings over the least that counts, limits are interpolated;
+    otherwise they lie halfway between two values.
     """
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
@@ -80,9 +82,9 @@ GONE = 1e-3
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation of the pairs that are known.
+    """Return Spearman's rank correlation of the pairs of x and y in which both are known.
 
-    It is NaN for fewer than three pairs, or if one side is constant.
+    The result is NaN for fewer than three pairs, or if x or y is constant.
     """
     defined = ~(np.isnan(x) | np.isnan(y))
     ranks = [rankdata(values[defined]) for values in (x, y)]
@@ -97,7 +99,7 @@ def trend_text(correlation: float) -> str:
 
 
 def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
-    """Return the size of the largest square of cells that come to rest, over all valid cells."""
+    """Return the fraction of the valid cells in the largest square in which all come to rest."""
     free = valid & ~moving
     side = free.astype(int)  # size of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
@@ -108,7 +110,7 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
 
 
 def overlap(part: np.ndarray, total: np.ndarray) -> float:
-    """Return the fraction of cells of `total` that are also in `part`; NaN for none."""
+    """Return the fraction of cells of `total` that are also in `part`; NaN if `total` has none."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 

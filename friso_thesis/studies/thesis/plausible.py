@@ -292,7 +292,8 @@ def _fit(
 ) -> BestFit | None:
     """Return the draw, or friso's `own` choice, that fits the printed numbers best.
 
-    Hunting is judged by the peak count. A draw of which a number is unknown is left out.
+    Hunting is judged by the peak count. A draw of which a number is unknown is left out. Returns None if no draw is
+    left.
     """
     first = baseline()
     at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]

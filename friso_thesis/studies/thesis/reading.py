@@ -62,7 +62,7 @@ def reading() -> WordReading:
 
 @contextmanager
 def read_as(other: WordReading) -> Iterator[None]:
-    """Judge by another reading within the block."""
+    """Judge claims by the reading `other` of the thesis's words within the block."""
     before = _READ.set(other)
     try:
         yield
@@ -135,7 +135,7 @@ OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
 
 
 def others_of(words: Set[str]) -> dict[str, WordReading]:
-    """Return the other readings that differ in one of these words."""
+    """Return the other readings, by description, that give one of these words another number."""
     return {
         name: other
         for name, other in OTHERWISE.items()

@@ -230,9 +230,10 @@ def _read_otherwise(entry: Registered, base: Evidence, words: Set[str]) -> dict[
 def _others(
     entries: Mapping[str, Registered], base: Evidence, loose: Mapping[str, xr.Dataset]
 ) -> dict[str, dict[str, Finding]]:
-    """Return the findings on coarser maps, and on maps at the thesis's tolerance.
+    """Return the findings on other maps, by the method that made the maps and by claim.
 
-    Coarser maps have every second value of each axis.
+    The maps are coarser ones, with every second value of each axis, and the maps `loose`, at the thesis's tolerance.
+    Claims without maps are left out.
     """
     grids = {
         "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
@@ -256,9 +257,9 @@ def _second(runs: xr.Dataset) -> xr.Dataset:
 def _needs(
     entries: Mapping[str, Registered], chosen: Mapping[str, ThesisStudy], asked: frozenset[str] | None
 ) -> set[str]:
-    """Return what must be computed: what the claims need.
+    """Return the names of all that must be computed for the claims.
 
-    Without named studies, all studies and responses are added.
+    If no claims were `asked` for by name, the `chosen` studies are added, and all responses and parts of the analysis.
     """
     needs = {need for entry in entries.values() for need in entry.needs}
     return needs if asked is not None else needs | chosen.keys() | RESPONSES.keys() | NEEDS.keys()
@@ -285,7 +286,10 @@ def _studies(names: Iterable[str] | None) -> dict[str, ThesisStudy]:
 
 
 def _claims(only: Iterable[str] | None) -> frozenset[str] | None:
-    """Return the claims requested, in any spelling of case; all if none is."""
+    """Return the names of the claims requested, in their usual spelling; None if all are.
+
+    Raises InputError for an unknown claim.
+    """
     if only is None:
         return None
     ids = {claim.id.upper(): claim.id for claim in claims()}

@@ -27,8 +27,8 @@ _OPEN_JOINT_KEYS = frozenset({"joint.damping", LIMITER_PULLS})
 class OpenValue:
     """A value that the thesis leaves open, from `low` to `high` [unit].
 
-    `scale` tells how it is sampled: evenly, in its logarithm, or as one of the two ends. It has the keys of the stage
-    file that it sets, why it may lie anywhere in the range, and friso's own choice (`baseline`).
+    `scale` tells how it is sampled: evenly, in its logarithm, or as one of the two ends. Stored as well are the keys of
+    the stage file that the value sets, and why it may lie anywhere in the range. `baseline` is friso's own choice.
     """
 
     name: str

@@ -54,7 +54,7 @@ class ThesisStudy:
 
     @property
     def sets(self) -> frozenset[str]:
-        """Return the keys that the study itself sets."""
+        """Return the keys that the study sets itself: its changes, axes and links."""
         return frozenset(span.key for span in self.spans) | frozenset(self.links) | frozenset(self.changes)
 
     @property
@@ -85,7 +85,7 @@ def rig_crossover() -> float:
 def rig_gains(mass: float) -> tuple[float, float, float]:
     """Return k_p [N/m], k_i [N/(m s)] and k_d [N s/m] of Eq. 6 for a mass [kg].
 
-    They follow from Eq. 7 and 8, at the crossover, alpha and beta of the rig.
+    The gains follow from Eq. 7 and 8, at the crossover, alpha and beta of the rig.
     """
     gains = as_gains(**numbers({**thesis_rig().flat(), TUNED_MASS: mass}))
     return gains["kp"], gains["ki"], gains["kd"]

@@ -46,7 +46,7 @@ class ClaimVerdict:
     def judgement(self) -> ClaimJudgement:
         """Return the judgement, at friso's own choice of the open values and at random ones.
 
-        A claim "holds" if it does at friso's choice and in at least half of the draws. It "depends" on the values left
+        A claim "holds" if it holds at friso's choice and in at least half of the draws. It "depends" on the values left
         open if it holds at friso's choice or in some draw, but not so often.
         """
         if self.finding is None:
@@ -62,15 +62,18 @@ class ClaimVerdict:
     def robust(self) -> bool:
         """Tell whether a claim fails for any plausible choice of what the thesis leaves open.
 
-        It does if it holds in no draw, its fraction is at most `ROBUST` by its interval, and nothing undrawn decides on
-        it.
+        The claim must hold in no draw of the open values, and at most in the fraction `ROBUST` by the 95 % interval. No
+        assumption outside the draws may decide on it.
         """
         fails = self.judgement in ("holds in part", "differs")
         return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)
 
     @property
     def dependence(self) -> str:
-        """Say for which fraction of random open values a claim holds, and on what that depends."""
+        """Say for which fraction of random open values a claim holds, and on what that depends.
+
+        The text is empty if the claim was not judged.
+        """
         if self.finding is None:
             return ""
         if self.space is None:
@@ -100,13 +103,19 @@ class ClaimVerdict:
         return ", ".join(item.value for item in self.space.hangs_on) if self.space else ""
 
     def _word_of(self, finding: Finding) -> str:
-        """Return the judgement by another meaning of a word: its name, or "still" and the own one."""
+        """Return how a finding by another meaning of a word judges the claim.
+
+        If that is how the claim is judged anyway, "still" is put before it.
+        """
         own = self.finding.judgement if self.finding else ""
         return finding.judgement if finding.judgement != own else f"still {own}"
 
 
 def draws_text(share: Share, count: int, draws: int) -> str:
-    """Write for which fraction of the random choices of open values a claim holds."""
+    """Write for which fraction of the random choices of open values a claim holds.
+
+    `count` is the number for which it holds, of `draws` choices.
+    """
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 
 
@@ -138,8 +147,8 @@ def verdict(
 ) -> ClaimVerdict:
     """Return the verdict from findings by the thesis's count and by what attracts the stages.
 
-    `others` are findings by another method, by its name. `readings` are findings by another reading of the words. Both
-    are mentioned if other parts of the claim hold there.
+    `others` are findings by another method, by its name. `readings` are findings by another reading of the thesis's
+    words. A finding of either kind is mentioned if other parts of the claim hold by it.
     """
     turned = {
         name: f"with {name} {_change(finding, other)}"
@@ -155,7 +164,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Say how the claim is judged by the second finding, with numbers of parts that differ."""
+    """Say how a second finding judges the claim, with the number in each part that it turns."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

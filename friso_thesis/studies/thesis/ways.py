@@ -52,6 +52,9 @@ def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray, a
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:
-    """Return the evidence, whose maps and responses are judged by one criterion through `read`."""
+    """Return a copy of the evidence with `read` applied to its maps and responses.
+
+    `read` computes the numbers that judges read by one of the two criteria.
+    """
     responses = {name: Response(read(item.cell), item.trace) for name, item in evidence.responses.items()}
     return replace(evidence, maps={name: read(runs) for name, runs in evidence.maps.items()}, responses=responses)

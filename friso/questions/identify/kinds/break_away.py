@@ -39,7 +39,7 @@ def _numbers(result: BreakAway) -> dict[str, Any]:
 
 
 def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw the break-away force over the force rate."""
+    """Draw the break-away force over the force rate; nothing without ramps."""
     ramps = result.ramps
     if not len(ramps.times):
         return []

@@ -98,7 +98,10 @@ def _friction(direction: Direction) -> dict[str, Estimate]:
 
 
 def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
-    """Draw friction over velocity with intervals and the fit of each direction."""
+    """Draw friction over velocity with intervals and the fit of each direction.
+
+    The list is empty if no velocity was measured. `name` begins the figure's name.
+    """
     if not len(friction.velocities):
         return []
     series, markers = [], []
@@ -118,7 +121,10 @@ def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
 
 
 def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
-    """Draw the curve fitted to one direction, over the velocities it was fitted to."""
+    """Draw the curve fitted to one direction, over the velocities it was fitted to.
+
+    The list is empty if Coulomb or viscous friction could not be determined.
+    """
     if not (direction.coulomb.determined and direction.viscous.determined):
         return []
     size, curve = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.curve
@@ -133,7 +139,7 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
 
 
 def _position(friction: FrictionPosition, name: str) -> list[Figure]:
-    """Draw the friction force over the position on the rail, pass by pass."""
+    """Draw the friction force over the position on the rail, pass by pass; empty without passes."""
     if not friction.passes:
         return []
     colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))

@@ -65,7 +65,7 @@ def _figures(result: HuntingLog, logs: Sequence[Source], name: str) -> list[Figu
 
 
 def _headline(result: HuntingLog) -> str:
-    """Say how the stage hunts."""
+    """Say with which amplitude and period the stage hunts, and how many cycles were seen."""
     return f"It hunts: ±{with_unit(result.amplitude, 'm')} every {result.period:.3g} s, {result.count} cycles."
 
 

@@ -149,7 +149,8 @@ def _profile_numbers(profile: Profile) -> dict[str, Any]:
 def _headline(moves: IdentifiedMoves) -> str:
     """List what is identified if the force is not in newtons, as it must be in a stage file.
 
-    Values are then in units of that force; the sentence says how to give its scale. It is empty for a force in newtons.
+    Values are then in units of that force; the sentence says how to give its scale. For a force in newtons, the
+    sentence is empty.
     """
     if moves.force_unit == "N":
         return ""
@@ -177,7 +178,7 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
 
 
 def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[Figure]:
-    """Draw another log as measured and as simulated."""
+    """Draw another log as measured and as simulated; `number` is that of the log."""
     caption = (
         f"{log.name}: simulated with the values identified from the other logs; relative error of the position "
         f"{percent(simulated.errors.position, 3)}, of the force {percent(simulated.errors.force, 3)}."

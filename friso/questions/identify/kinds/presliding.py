@@ -37,7 +37,10 @@ def _numbers(result: Presliding) -> dict[str, Any]:
 
 
 def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw force and model, and the motion, over the last tenth of the record."""
+    """Draw force and model, and the motion, over the last tenth of the record.
+
+    The list is empty if no model was fitted.
+    """
     if not len(result.model):
         return []
     return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(result), presliding_panels(result))]

@@ -36,7 +36,7 @@ def _numbers(result: SlowSliding) -> dict[str, Any]:
 
 
 def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Figure]:
-    """Draw measured and modelled friction, over velocity and over time."""
+    """Draw measured and modelled friction, over velocity and over time; empty without a model."""
     if not len(result.model):
         return []
     caption, panels = slow_sliding_caption(result), slow_sliding_panels(result)

@@ -27,7 +27,7 @@ def _facts(result: StepStiffness) -> Facts:
 
 
 def _sentences(result: StepStiffness) -> tuple[str, ...]:
-    """Say whether the cart moved, where that was measured."""
+    """Say whether the cart moved; empty if that was not measured."""
     fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[result.cart_fixed]
     return (fixed,) if fixed else ()
 

@@ -1,4 +1,4 @@
-"""Show how much of the dynamic friction constant speed on the rig reveals (thesis, Fig. 21)."""
+"""Show what motion at constant speed on the rig shows of dynamic friction (thesis, Fig. 21)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Say what the experiment shows of friction along the rail and over speed, beside the truth."""
+    """Say what the experiment shows of friction along the rail and over speed.
+
+    True values stand beside the measured ones.
+    """
     result: ConstantSpeedResult = outcome.result
     lines = [f"Joint {case.name}: {case.place.verdict}" for case in result.cases]
     for case in result.cases:
@@ -41,7 +44,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _slow(result: ConstantSpeedResult) -> list[str]:
-    """Say what slow sliding shows of friction."""
+    """Say what slow sliding shows of friction; empty if it was not tried."""
     if not result.slow:
         return []
     head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
@@ -117,7 +120,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
-    """Draw the friction in slow sliding at the first place that shows it."""
+    """Draw the friction in slow sliding at the first place that shows it; empty if none does."""
     result: ConstantSpeedResult = outcome.result
     places = [sliding.result for sliding in result.slow if len(sliding.result.model)]
     if not places:

@@ -1,6 +1,6 @@
 """Show frequency responses on the rig.
 
-The results are plants, mass lines, open loops, and the highest stable setting.
+The results are plants, mass lines, open loops, and the highest stable crossover.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 
 
 def _numbers(plant: Plant) -> dict[str, Any]:
-    """Return the plant with the joint in one state."""
+    """Return the plant with the joint in one state, for the JSON document."""
     averaged: FrequencyResponse = plant.averaged
     return {
         "mass_kg": plant.mass.value,
@@ -195,7 +195,7 @@ def _numbers(plant: Plant) -> dict[str, Any]:
 
 
 def _loop_numbers(loop: MeasuredLoop) -> dict[str, Any]:
-    """Return the crossovers of a loop."""
+    """Return the tuned crossover and the measured 0 dB crossings [Hz] of an open loop."""
     return {"tuned_hz": loop.tuned, "crossings_hz": [crossing.value for crossing in loop.crossings]}
 
 

@@ -82,7 +82,10 @@ def _swings(moves: HuntingResult) -> str:
 
 
 def _limit(moves: HuntingResult, case: str) -> str:
-    """Say up to which crossover peaks are counted, on any rail and on the one shown."""
+    """Say up to which crossover peaks are counted on any rail, and on the rail that is shown.
+
+    `case` is the state of the joint.
+    """
     last, on_rail = moves.limit(case), moves.limit(case, moves.rail)
     if np.isnan(last):
         return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
@@ -161,7 +164,10 @@ def _on(moves: HuntingResult) -> str:
 
 
 def _rail(moves: HuntingResult, number: int, before: str) -> str:
-    """Name a rail, if there are several; a stage file without [rail] has a single nameless one."""
+    """Name a rail by its seed, after the text `before`, if there are several; empty otherwise.
+
+    A stage file without [rail] has a single nameless rail.
+    """
     return f"{before} rail {moves.rails[number]:.0f}" if len(moves.rails) > 1 else ""
 
 

@@ -19,7 +19,7 @@ ROWS = 4
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Say which stiffness and damping of the bristles each place shows, beside the truth."""
+    """Say which stiffness and damping of the bristles each place shows, beside the true values."""
     result: Bristles = outcome.result
     lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)

@@ -30,7 +30,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Draw position and force over time."""
+    """Draw position and force over time in the experiment with position steps."""
     result: Stiffness = outcome.result
     (log,) = outcome.logs
     time, seconds = result.steps.time, Axis("Time", "s")

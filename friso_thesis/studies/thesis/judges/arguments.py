@@ -81,7 +81,7 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
 def _margins(stage_file: str) -> dict[float, float]:
     """Return the least modulus margin by the mass [kg] that the controller assumes.
 
-    It is that of the limit cases, and of all states stuck under a bias force; 0 if one is unstable.
+    The limit cases count, and all states stuck under a bias force. The margin is 0 if one of them is unstable.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     whole = flat["masses.cart"] + flat["masses.stage"]

@@ -128,7 +128,7 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
 def _mean_rank_correlation(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> float:
     """Return the mean rank correlation of the rows of x and y, over the cells that keep moving.
 
-    All arrays have one shape.
+    All arrays have one shape. The result is NaN if no row has a correlation.
     """
     trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, moving, strict=True))])
     return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan

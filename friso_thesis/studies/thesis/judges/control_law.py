@@ -75,7 +75,7 @@ def judged_forms(gains: tuple[sp.Expr, sp.Expr, sp.Expr], tuned: dict[str, float
 
 
 def _written(expression: sp.Expr) -> str:
-    """Return an expression as people write it."""
+    """Write a SymPy expression in a readable form, as text."""
     return str(sp.factor(expression)).replace("**", "^").replace("*", " ")
 
 

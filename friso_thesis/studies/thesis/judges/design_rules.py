@@ -80,7 +80,7 @@ def _needed_ratio(stage_file: str) -> float:
 def _margins_at_the_top(stage_file: str) -> dict[str, float]:
     """Return the least modulus margin at the highest crossover, joint locked and free.
 
-    It is that of the limit cases, and of all states stuck under a bias force; 0 if one is unstable.
+    The limit cases count, and all states stuck under a bias force. The margin is 0 if one of them is unstable.
     """
     flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
@@ -160,7 +160,7 @@ def _gap(evidence: Evidence) -> Part:
 def _locked_edge() -> str:
     """Say up to which crossover a cycle of the locked rig attracts, with the abstract's mass.
 
-    It is computed as `friso check` does.
+    The search is that of `friso check`; if it locates no edge, the text says so.
     """
     edge = find_margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
     rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"

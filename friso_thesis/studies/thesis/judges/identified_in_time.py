@@ -187,7 +187,7 @@ def _between(shares: list[float]) -> str:
 
 
 def _interval(estimate: Estimate) -> str:
-    """Write a correlation with its interval."""
+    """Write a correlation with its interval, or that it was not determined."""
     if not estimate.determined:
         return "not determined"
     return f"{estimate.value:.2f} ({estimate.low:.2f} to {estimate.high:.2f})"

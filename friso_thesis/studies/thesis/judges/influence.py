@@ -69,9 +69,9 @@ def _influence(stage_file: str, studies: list, locked: bool) -> dict[str, float]
 
 
 def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
-    """Return the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1).
+    """Return how well `values` separate stages that hunt: 1 or -1 fully, 0 not at all.
 
-    It is 0 if all stages hunt, or none.
+    This is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1). It is 0 if all stages hunt, or none.
     """
     from scipy.stats import mannwhitneyu
 

@@ -41,8 +41,8 @@ def _evaluated() -> tuple[Evaluation, ...]:
 def mechanism(young: float, spacing: float, height: float) -> Mechanism:
     """Return the rig's leaf springs for values that the thesis leaves open.
 
-    They are a Young's modulus [Pa], a spacing of the leaves [m], and a height [m] of the stage's centre of mass above
-    the leaf ends.
+    The open values are a Young's modulus [Pa] and a spacing of the leaves [m]. The third is a height [m] of the stage's
+    centre of mass above the leaf ends.
     """
     steel, mass, length = materials()["stainless 1.4310"], thesis_rig().flat()["masses.stage"], 70e-3
     centre = (length + height, 0.0, 0.0)
@@ -116,10 +116,7 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 
 def _as_beams(young: float) -> float:
-    """Return the drive stiffness [N/m] of leaves that curl freely: n 12 E I/L^3.
-
-    They curl across their width.
-    """
+    """Return the drive stiffness [N/m] of leaves that may curl across their width: n 12 E I/L^3."""
     own = mechanism(young, _SPACINGS[0], _HEIGHTS[0])
     return own.leaves * 12 * own.young * own.bending / own.length**3
 

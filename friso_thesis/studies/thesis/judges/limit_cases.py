@@ -107,9 +107,9 @@ def _why_far(ratio: float) -> str:
 
 
 def _masses(evidence: Evidence) -> dict[bool, float]:
-    """Return the mass [kg] that moves above the first eigenfrequency.
+    """Return the mass [kg] that moves above the first eigenfrequency, by the limiter's state.
 
-    Its key tells whether the limiter is touched (True) or free (False).
+    The key is True for a touched limiter, and False for a free one.
     """
     flat = evidence.rig.flat()
     return {False: flat["masses.stage"], True: flat["masses.cart"] + flat["masses.stage"]}

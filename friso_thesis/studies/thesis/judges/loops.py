@@ -56,7 +56,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 
 
 def _beyond(locked: CrossoverLoops) -> str:
-    """Say where the locked loop, tuned to the highest setting, crosses 0 dB again."""
+    """Say where the locked loop, tuned to the highest crossover, crosses 0 dB again."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
@@ -116,7 +116,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 
 def _why_elsewhere(contact: Contact) -> str:
-    """Say what it would take to cross 0 dB where the thesis measured it."""
+    """Say which change of the model would make the loop cross 0 dB where the thesis measured it."""
     soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
         "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
@@ -127,7 +127,10 @@ def _why_elsewhere(contact: Contact) -> str:
 
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
-    """Judge whether a further crossing of 0 dB takes the loop close to instability."""
+    """Judge whether a further crossing of 0 dB takes the loop close to instability.
+
+    `setting` is the tuned crossover, and `further` are the crossings above it [Hz].
+    """
     close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
@@ -188,7 +191,7 @@ def crossing_nearest(margins: Margins, frequency: float) -> float:
 
 
 def _further(margins: Margins, setting: float) -> tuple[float, ...]:
-    """Return the 0 dB crossings [Hz] above that of the tuned crossover."""
+    """Return the 0 dB crossings [Hz] above the one nearest to the crossover `setting` [Hz]."""
     return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 
@@ -215,7 +218,10 @@ def _sampled(analysis: Linear) -> FindingTable:
 
 
 def _edges(analysis: Linear, setting: float) -> str:
-    """Return the delays at which a setting is at the edge of stability."""
+    """Say at which delays the loop tuned to a crossover [Hz] is at the edge of stability.
+
+    The crossover is `setting`; the delays are those with the joint free and locked.
+    """
     edges = {"free": analysis.free.delay_at[setting], "locked": analysis.locked.delay_at[setting]}
     parts = [
         f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()

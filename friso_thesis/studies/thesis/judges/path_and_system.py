@@ -113,7 +113,7 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
 def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
     """Say how many cells keep moving at the highest crossover at which any does.
 
-    The text also gives the largest number of peaks counted in them.
+    The text also gives the largest number of peaks counted in these cells. It is empty if no cell keeps moving.
     """
     rows = np.flatnonzero(moving.any(axis=1))
     if not rows.size:

@@ -40,7 +40,7 @@ def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
 def _beside(counted: tuple[int, int], threshold: float) -> str:
     """Say that a count of rails is too near a `threshold` to decide; "" if it decides.
 
-    It is too near if the interval of the fraction holds the threshold.
+    The count is too near if the 95 % interval of its fraction contains the threshold.
     """
     low, high = share_interval(*counted)
     return BESIDE if low < threshold < high else ""

@@ -53,7 +53,7 @@ def _crossings(loops: RigLoops) -> Part:
 
 
 def _further(loops: RigLoops) -> Part:
-    """Judge whether the loop with the highest setting crosses 0 dB again."""
+    """Judge whether the loop tuned to the highest crossover crosses 0 dB again."""
     words = reading()
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]

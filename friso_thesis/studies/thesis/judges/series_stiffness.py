@@ -1,6 +1,7 @@
 """Judge Eq. 1 and 2: joint and pre-sliding friction as springs in series.
 
-They are differentiated, and compared with the plant.
+The stiffness of such springs is derived and differentiated. Both formulas are compared with the results, and Eq. 1 with
+the plant.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, P
 
 
 def _written(expression: sp.Basic) -> str:
-    """Return an expression as people write it."""
+    """Write a SymPy expression in a readable form, as text."""
     return str(expression).replace("**", "^").replace("*", " ")
 
 

@@ -43,7 +43,7 @@ class Sticking:
     direction: np.ndarray
 
     def mean(self, values: np.ndarray) -> float:
-        """Return the mean of the means in both directions; NaN if one direction is missing.
+        """Return the mean over directions of the mean of `values`; NaN if one direction is missing.
 
         Sticks may alternate between long and short, because a cycle need not be symmetric.
         """

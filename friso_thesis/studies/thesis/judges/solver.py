@@ -74,7 +74,7 @@ def _kept(values: Mapping[str, float], name: str) -> Counted:
 
 @cache
 def own_runs(rtol: float) -> Mapping[str, Counted]:
-    """Run the cases with friso at a relative tolerance.
+    """Run friso at a relative tolerance on the runs that are compared (`CASES`), by name.
 
     The swing is 0 for a stage that does not swing at the end.
     """
@@ -134,7 +134,7 @@ OTHER_SOLVERS = "thesis.other-solvers"
 
 @judges("S323C", figure="Sec. 3.2.3, other solvers")
 def other_solvers(evidence: Evidence) -> Finding:
-    """Compare the solvers that the thesis weighs, on the locked and on the free rig."""
+    """Compare the solvers that the thesis considers, on the locked and on the free rig."""
     return judged_solvers(findings_on_file()[OTHER_SOLVERS].values)
 
 
@@ -182,7 +182,7 @@ _SOLVERS = ("ode23s", "ode15s", "ode45")
 
 
 def _title(name: str) -> str:
-    """Return a run's name in words."""
+    """Write the name of a run, such as "locked_8_hz", with blanks and units."""
     return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")
 
 

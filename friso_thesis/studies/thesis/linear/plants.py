@@ -101,7 +101,7 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Return at which frequencies [Hz] the plant has peaks; with `sign` = -1, where it has dips."""
+    """Return at which frequencies [Hz] the plant has peaks, or dips if `sign` is -1."""
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))
@@ -115,9 +115,9 @@ def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: in
 
 
 def _mass_line(case: LimitCase) -> float:
-    """Return the middle of the mass line [Hz].
+    """Return the frequency [Hz] in the middle of the mass line.
 
-    It lies between the antiresonance of the parasitic mode and lower modes.
+    The mass line lies between lower modes and the antiresonance of the parasitic mode.
     """
     high = max((f for f in case.antiresonances if f < case.parasitic), default=np.nan)
     low = max((f for f in case.resonances if f < high), default=high / 10)

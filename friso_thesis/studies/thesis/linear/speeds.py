@@ -68,7 +68,7 @@ def _unstable(flat: Mapping[str, Any], touched: bool) -> tuple[Range, ...]:
 
 
 def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
-    """Return states that slide at these speeds [m/s]."""
+    """Return states that slide at these speeds [m/s], the limiter `touched` or free."""
     n = len(speed)
     return Members(speed, np.zeros(n), np.full(n, touched), np.full(n, True))
 

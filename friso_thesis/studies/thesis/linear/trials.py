@@ -33,7 +33,7 @@ class Contact:
     """A contact of cart and stage so soft that its mode lies at a further crossing of 0 dB.
 
     That crossing was measured. The contact has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop,
-    locked at the highest setting, with the rig's limiter damping; `undamped` are those with little damping.
+    locked and tuned to the highest crossover, with the rig's limiter damping; `undamped` are those with little damping.
     """
 
     stiffness: float
@@ -47,7 +47,7 @@ def identified_loop(stage: Stage) -> Margins:
 
 
 def soft_contact(stage: Stage) -> Contact:
-    """Compute the soft contact (see `Contact`).
+    """Compute a contact of cart and stage whose mode lies at the further 0 dB crossing measured.
 
     The part of the stage that its parasitic mode carries hardly takes part in the contact's mode.
     """
