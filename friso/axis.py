@@ -131,7 +131,10 @@ def axis_shown() -> AxisKind:
 
 
 def unit_shown(unit: str) -> str:
-    """Return the shown unit for a unit of a linear axis."""
+    """Return the unit to show for a unit of a linear axis: on a rotary axis, "m" becomes "rad".
+
+    The kind of axis is the one set by `speak_of` or `speaking_of`, linear by default.
+    """
     return axis_shown().unit(unit)
 
 

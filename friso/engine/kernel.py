@@ -234,10 +234,10 @@ class Kernel:
         return list(rows)
 
     def scales(self, values: list[np.ndarray], runs: int) -> np.ndarray:
-        """Return the magnitudes of the states, shape (runs, states); 1 for a state that nothing moves."""
+        """Return the magnitudes of the states, shape (runs, states), of runs; 1 where the model gives none."""
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             scales = columns(self.module.scales(values), runs)
-        scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # any tolerance will do
+        scales[~((scales > 0) & np.isfinite(scales))] = 1.0
         return scales
 
 
@@ -289,10 +289,11 @@ def kernel(
     lanes: int = LANES,
     along: tuple[str, ...] = (),
 ) -> Kernel:
-    """Return the compiled code of a structure, with a step method and so many runs at once.
+    """Return the compiled code that integrates stages of a structure by a step method.
 
-    With `variational`, it also integrates a small deviation of every state, and optionally of keys of the stage file,
-    `along` (`friso.equations.variational`).
+    The code integrates `lanes` runs at once. With `variational`, it also integrates how a small deviation of each state
+    grows. `along` names keys of the stage file whose small deviations are followed, too
+    (`friso.equations.variational`).
     """
     return kernels([KernelRequest(structure, variational, method, lanes, along)])[0]
 

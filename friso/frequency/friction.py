@@ -31,9 +31,10 @@ FORWARD = str(direction(VELOCITY).beyond)
 class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force.
 
-    `sliding` and `stuck` are functions for the law's steady states, sliding at a velocity and bearing a bias force at
-    rest: internal states, then modes with memory and sides of kinks, where derivatives jump. `lengths` [m] gives those
-    scales of its states that are lengths.
+    Four fields are functions of the keys [SI] and of what a steady state needs. `sliding` returns the steady state at a
+    velocity, `stuck` the one that bears a bias force at rest. Both list the law's internal states, then the values of
+    `modes`: its modes with memory, and the sides of its kinks, where derivatives jump. `force` returns the friction
+    force [N] of steady sliding. `lengths` returns the typical sizes [m] of internal states measured in metres.
     """
 
     declared: Declared

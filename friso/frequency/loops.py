@@ -120,9 +120,10 @@ class Poles:
         return np.sqrt(squared)
 
     def loop(self, omega: np.ndarray) -> Complex:
-        """Return the loop L at angular frequencies (k,) [rad/s], shape (members, k).
+        """Return the open loop L in each state, shape (members, k).
 
-        Its error is relative to its size and to 1.
+        `omega` [rad/s], shape (k,), are angular frequencies. L is computed from the poles as a ratio minus 1. Its
+        rounding error is therefore relative to abs(1 + L): where L is much smaller than 1, few of its digits are right.
         """
         at = self._at(omega)
         ratio = np.ones((len(self.closed), len(omega)), complex)

@@ -94,7 +94,7 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
 
 
 def concatenate_families(parts: list[Members]) -> Members:
-    """Return all states of several families, one after the other."""
+    """Return the states of several `Members` as one, in the order of the list."""
     return Members(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Members)))
 
 

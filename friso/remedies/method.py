@@ -92,7 +92,10 @@ class Advice:
 
     @property
     def least(self) -> RemedyOutcome | None:
-        """Return the smallest change that works (see `ChangeSize`), for all moves if there is one; or None."""
+        """Return the remedy with the smallest change that works (`ChangeSize`); None if none does.
+
+        Remedies that work for all moves come before those that do not, however small the change.
+        """
         return next(iter(self.working), None)
 
     def complete(self, tuned: Stage) -> Stage:

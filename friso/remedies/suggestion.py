@@ -26,7 +26,7 @@ DAMPING = (0.05, DAMPING_RATIOS[1])
 class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` is true if the stage hunts neither at its bandwidth nor below it, down to the distance that advice keeps.
+    `settles` is true if the stage hunts neither at its bandwidth nor at this bandwidth divided by `Goal.distance`.
     `margin` is the least modulus margin of the limit cases, and of all states stuck under a bias force. If no joint
     settles, this is the last one tried.
     """

@@ -345,5 +345,8 @@ def lost_places(result: Plane) -> np.ndarray:
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:
-    """Return the verdicts on the stages that were simulated for a diagram or a plane, in order."""
+    """Return whether each simulated stage of a diagram or a plane has an attractor, as words.
+
+    The words are ATTRACTS, REPELS and UNKNOWN. Their order is that of `result.attracts`.
+    """
     return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

@@ -163,7 +163,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
-        """Return the controller's keys and, if it has one, the velocity loop's integral as a gain."""
+        """Return the numbers to enter into a drive: the keys of the controller that are not 0.
+
+        If the velocity loop has an integral time Tn, its integral gain kp/Tn [N/m] is returned too.
+        """
         listed = super().gains(flat)
         if VELOCITY_TIME not in flat:
             return listed

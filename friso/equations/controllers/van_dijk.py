@@ -73,9 +73,10 @@ class VanDijk(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return another structure to try: equal gains, with the derivative of the measurement.
+        """Return another structure to try, in which the derivative acts on the measurement.
 
-        Returns its name and the keys that change [SI].
+        The gains stay as they are. The result maps its name to the keys that change, with their values [SI]; None
+        removes a key.
         """
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
         written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}

@@ -95,10 +95,11 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """Return the index of the sample, with a fraction, at which the integrator is balanced.
+    """Return at which sample, with a fraction, the integrator balances the constant forces.
 
-    If that happens several times, the instant after the longest standstill counts; 0 if it never happens. `residuals`
-    are the imbalance of the integrator, `place` [m] the sticking position, both of shape (samples,).
+    There the imbalance of both, `residuals`, passes zero. Among several such instants, the one with the longest
+    standstill before it counts; 0 is returned if there is none. `place` [m] is the position that sticks. Both arrays
+    have the shape (samples,).
     """
     settings = SurveySettings.current()
     if not np.isfinite(place).any():  # the run failed

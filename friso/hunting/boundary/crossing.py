@@ -24,12 +24,13 @@ class Crossing(NamedTuple):
 def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     """Fit a cubic to values over places, shape (n,), and return where it passes zero.
 
-    A zero counts only where the cubic rises or falls as a straight line through the values does. The last zero that
-    counts is returned. Its error is twice its shift by the scatter of the values, or the distance to the farthest other
-    zero, if larger.
+    A zero counts if it lies within the range of places, and the cubic goes up or down there as the values do overall.
+    The last zero that counts is returned.
 
-    Returns None if there are too few values, or no zero counts among the places. Returns None as well if the error
-    exceeds half of the range of places.
+    Its error is twice the distance by which the scatter of the values may shift it. If another zero within the range,
+    counted or not, lies farther away than that, the error is the distance to the farthest.
+
+    Returns None if there are too few values, if no zero counts, or if the error exceeds half of the range of places.
     """
     if len(places) < ContinuationSettings.current().least_cubic_values:
         return None

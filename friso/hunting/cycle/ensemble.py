@@ -130,7 +130,7 @@ class Ensemble:
         """Return the magnitudes of the states, shape (count, states)."""
         size = np.where(self.length > 0, self.length, OrbitSettings.current().frictionless_size)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
-        return self.kernel.scales(values, self.count)
+        return columns(self.kernel.module.scales(values), self.count)
 
     @property
     def sticking(self) -> int:

@@ -308,9 +308,10 @@ def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
 def small_cycles_possible(stages: Ensemble) -> np.ndarray:
     """Return which stages may have cycles smaller than the survey covers, shape (count,).
 
-    A cycle needs a fall of friction with speed, at a ratio to its amplitude within `feeding_ratio_range`. Small cycles
-    are possible where this ratio falls as swings grow, and meets that range. They are possible, too, where friction
-    falls so little that the survey may miss cycles, but steeply enough to feed one.
+    A cycle is fed by the fall of friction over its speeds. The ratio of this fall, in break-away forces, to the
+    amplitude, in deflections at break-away, must lie in `feeding_ratio_range`. A stage may have small cycles in two
+    cases. In the first, the ratio falls as small swings grow, and takes values in that range. In the second, friction
+    falls too little for the survey to find all cycles, but steeply enough to feed one.
     """
     settings = OrbitSettings.current()
     possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)

@@ -98,10 +98,10 @@ def _straight(pairs: np.ndarray) -> float:
 def returns_of(
     stages: Ensemble, orbits: Orbits, direction: np.ndarray, away: np.ndarray, returns: int, rtol: float
 ) -> np.ndarray:
-    """Measure how far stages swing [m] on each return, (count, points, returns).
+    """Measure how far stages swing [m] on each return, shape (count, points, returns).
 
-    Runs begin beside their orbits, along a direction (count, states), at fractions (1, points) of the sticking
-    distance. Returns that a run does not make are NaN.
+    Each run starts displaced from its orbit along `direction`, shape (count, states). `away`, shape (1, points), has
+    the displacements as fractions of the orbit's sticking distance. Returns that a run does not make are NaN.
     """
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]

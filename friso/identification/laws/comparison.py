@@ -52,8 +52,9 @@ class LawPrediction:
 class LawComparison:
     """The friction laws, ranked by their prediction of logs, the best first.
 
-    `logs` are the names of the logs used, `left_out` has the reason for each other log by its name, and `parts` counts
-    the predicted parts. `unseen` is true if fits started from the stage as it was before any log.
+    `logs` are the names of the logs used, and `left_out` has the reason for each other log by its name. `parts` is the
+    number of parts into which the logs were cut; each part is predicted by fits to the others. `unseen` is true if fits
+    started from the stage as it was before any log.
     """
 
     predictions: tuple[LawPrediction, ...]

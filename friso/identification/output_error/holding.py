@@ -1,4 +1,7 @@
-"""Decide how smooth the motion of a log was, and whether its force was held or interpolated between samples."""
+"""Decide how much to smooth a log's position, and how its force ran between samples.
+
+The force was either held or interpolated. Each choice is the one with which the model fits the log better.
+"""
 
 from __future__ import annotations
 

@@ -313,10 +313,11 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
-    """Return the deflection [m] of bristles, shape (n,), under a moving body.
+    """Return the deflection [m] of bristles under a moving body at n samples, shape (n,).
 
-    The moves [m] have the shape (n - 1,). At their velocities the bristles approach `ends` [m], shape (n - 1,); they
-    start from the deflection `start` [m]. The solution is exact in each move.
+    `moves` [m], shape (n - 1,), are the displacements between samples. During a move the bristles approach a steady
+    deflection in its direction, whose size is in `ends` [m], shape (n - 1,). `start` [m] is the first deflection. The
+    solution is exact in each move.
     """
     kept = np.exp(-np.abs(moves) / ends)
     after = np.append(start, np.sign(moves) * ends * (1 - kept))  # by each move alone

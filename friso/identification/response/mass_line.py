@@ -118,10 +118,11 @@ def _widest(
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
-    """Return the widest band with acceptable chi-square and phase, as its first and last line.
+    """Return the indices of the first and last spectral line of the widest straight band.
 
-    Its ends are among evenly spaced lines from `start` to before `stop`, at most `edges_tried` of them. Returns None if
-    no band is wide enough.
+    In the band, chi-square and phase must agree with a response that falls with frequency to the power `slope` and has
+    this `sign`. Spectral lines from `start` to before `stop` are searched; at most `edges_tried` evenly spaced ones are
+    tried as ends. Returns None if no such band is wide enough.
     """
     settings = ResponseSettings.current()
     if stop - start < settings.lines_of_a_band:

@@ -62,7 +62,11 @@ def fit_one_mass(
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return the response of one mass at every output, (outputs, lines), at frequencies [Hz]."""
+    """Return the response of one mass to a force, at frequencies [Hz]; shape (outputs, lines).
+
+    The mass has viscous friction and a spring to ground. Delay, hold and a compliance for each output are added.
+    `parameters` are in the order of this module's indices, such as `MASS`.
+    """
     mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
 
     def masses(frequency: np.ndarray) -> np.ndarray:

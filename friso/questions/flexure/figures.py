@@ -45,7 +45,10 @@ def _force(flexure: BothModels) -> Figure:
 
 
 def _support(flexure: BothModels) -> Figure:
-    """Draw the support stiffness along the leaves and along their width."""
+    """Draw the support stiffness over the deflection, by both models.
+
+    One panel is for forces along the leaves, the other for forces along their width.
+    """
     panels = (
         _supports(flexure, "Along the leaves (x)", lambda evaluation: evaluation.support_x / 1e6),
         _supports(flexure, "Along their width (y)", lambda evaluation: evaluation.support_y / 1e6),

@@ -24,10 +24,11 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Fractions of machines that come to rest by the controller alone, for n bandwidths.
+    """Fractions of drawn machines that come to rest by the controller alone, over bandwidth.
 
-    `bandwidths` [Hz] are the last 0 dB crossings of the open loop, from the present one to the highest with enough
-    margin. `shares` are the fractions. The joint is locked, and the controller in continuous time.
+    `bandwidths` [Hz], shape (n,), are the last 0 dB crossings of the stage's own open loop, with ever faster
+    controllers. They run from the present one to the highest that keeps enough margin. `shares`, shape (n,), are the
+    fractions. The joint is locked, and the controller in continuous time.
     """
 
     bandwidths: np.ndarray

@@ -56,10 +56,11 @@ _SLOPES = np.array([1.0, 2.0])
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Return the parts of a concave curve at x, (m,), each with end value 1; shape (m, 2 n).
+    """Return the parts, each with end value 1, whose weighted sum is a concave curve.
 
-    The first n columns are straight up to their knot. The other n are bent, so that their slope falls to 0 at their
-    knot. Below x = 0, where noise may lead, all parts continue straight.
+    Their values at x, shape (m,), have the shape (m, 2 n) for n `knots`. Every part rises from 0 at x = 0 to 1 at its
+    knot, and stays 1 beyond. The first n parts rise straight. The other n rise as parabolas whose slope falls to 0 at
+    the knot. Below x = 0, where noise may lead, all parts continue straight.
     """
     reached = np.minimum(x[:, None] / knots, 1.0)
     return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])

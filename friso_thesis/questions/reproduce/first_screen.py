@@ -1,6 +1,7 @@
 """Write the first screen of the page of `friso reproduce`.
 
-It shows what is right, what is right for another reason, and slips.
+It lists which claims of the thesis are right, which are right for another reason, and where the thesis has small
+mistakes.
 """
 
 from __future__ import annotations

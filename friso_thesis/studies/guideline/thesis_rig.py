@@ -80,9 +80,9 @@ class Laws:
 
 
 def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Return a stage's dimensionless groups, and the natural frequency [Hz] on its bristles.
+    """Return the dimensionless groups of stages by name, and natural frequencies [Hz].
 
-    The groups are arrays of one shape. The frequency belongs to cart and stage together on the bristle stiffness.
+    The groups are arrays of one shape. Each frequency is that of cart and stage together on the bristle stiffness.
     """
     values = values_of(flat)
     rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
