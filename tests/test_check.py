@@ -35,6 +35,11 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(checked: CheckAnswer) -> N
     _hunts_locked_and_settles_free(checked)
 
 
+def test_the_readme_shows_what_its_first_line_prints(checked: CheckAnswer) -> None:
+    readme = (EXAMPLES.parent / "README.md").read_text(encoding="utf-8")
+    assert [*checked.sentences()] == readme.partition("```text\n")[2].partition("\n```")[0].splitlines()
+
+
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_tighter_tolerance_changes_no_verdict(rig: Stage) -> None:
     _hunts_locked_and_settles_free(friso.check(rig, rtol=1e-8))

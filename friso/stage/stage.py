@@ -400,10 +400,9 @@ def _of_another_form(error: StageError, changes: Mapping[str, Any], others: Sequ
         return error
     own = [key for key in changes if key.startswith(f"{CONTROLLER}.")]
     key = next((key for key in own if key.partition(".")[2] not in OF_ANY_FORM), own[0])
-    missing = ", ".join([error.key, *error.actual.partition("missing: ")[2].split(", ")]).rstrip(", ")
     expected = (
-        f"its other keys, too ({missing}); or speed instead, an axis of friso map and friso boundary that scales any "
-        "controller"
+        f"its other keys, such as {error.key}, too; or speed instead, an axis of friso map and friso boundary that "
+        "scales any controller"
     )
     return StageError(key, f"a key of another form than yours ({', '.join(others)})", expected, 'speed="0.25..4"')
 

@@ -7,7 +7,7 @@ import numpy as np
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.identification.ways import ways_to_show
 from friso.shown.cases import case_labels
-from friso.shown.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
+from friso.shown.drawing.figure import BLUE, GREY, MAUVE, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
 from friso.shown.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval
 from friso.studies.draws import Draws, Fates
 from friso.studies.settings import StudySettings
@@ -17,7 +17,7 @@ COLOURS = {
     "bistable": ORANGE,
     "transient": SKY,
     "settles": BLUE,
-    "undecided": "#8c6d8f",
+    "undecided": MAUVE,
     "failed": GREY,
 }
 

@@ -63,11 +63,12 @@ def headline(runs: xr.Dataset, name: str) -> str:
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
     """Return the fraction of the map in which a finding holds, and where."""
     holds, completed = _flags(runs, name, finding.words)
+    open_words = _open_words(name) & {*text_counts(runs, name)} if finding.words else set()
     if not completed.any():
-        return "No cell of the map has a result."
+        return f"No cell of the map has a {'certain ' * bool(open_words)}result."
     if not holds.any() or np.array_equal(holds, completed):
-        certain = "" if completed.all() or not metrics()[name].doubt else " of which this is certain"
-        return f"{finding.clause} in {'every' if holds.any() else 'no'} cell of the map{certain}."
+        cell = "cell with a certain result" if open_words else "cell of the map"
+        return f"{finding.clause} in {'every' if holds.any() else 'no'} {cell}."
     share = f"{finding.clause} in {_percent(holds.sum(), completed.sum())} of the map"
     axes, inside = axes_of(runs), completed.copy()
     where = []
@@ -86,6 +87,11 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
     return f"{share}: at {listed(where, 'and')} ({filled})."
 
 
+def _open_words(name: str) -> set[str]:
+    """Return the words of a metric that say that a cell's result is not certain."""
+    return {word.text for word in metrics()[name].words if word.is_open}
+
+
 def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return in which cells a metric has one of some words, and which cells have a result.
 
@@ -95,10 +101,11 @@ def _flags(runs: xr.Dataset, name: str, words: tuple[str, ...]) -> tuple[np.ndar
     values = runs[name]
     holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
     rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
+    without = ["", *_NO_RESULT, *_open_words(name)]
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
         texts = part.astype(str)
-        ran = ~np.isin(texts, ["", *_NO_RESULT, "unknown", "undecided"]) if words else np.isfinite(part)
+        ran = ~np.isin(texts, without) if words else np.isfinite(part)
         completed[first : first + rows] = ran
         holds[first : first + rows] = ran & (np.isin(texts, words) if words else part.astype(float) > 0)
     return holds, completed

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import axis_shown
-from friso.shown.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Category
+from friso.shown.drawing.figure import GREY, INK, MAUVE, ORANGE, PINK, VERMILLION, Category
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
 from friso.studies.metric import metrics, worded
@@ -35,7 +35,7 @@ FAILED = Category("failed", INK)
 NOT_RUN = Category("not run", "#ffffff")
 _NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
 _NO_NUMBER = "#e8dcc6"
-PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "quiet": QUIET}
+PALETTE = {"vermillion": VERMILLION, "orange": ORANGE, "pink": PINK, "mauve": MAUVE, "quiet": QUIET}
 """Colours by the words that metrics use; metrics may also give "#rrggbb"."""
 
 

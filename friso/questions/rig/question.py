@@ -5,12 +5,20 @@ from __future__ import annotations
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
 from friso.interface.answer import Answer, question
-from friso.interface.inputs import LOGGER, Changes, ExperimentName, Seed, StageLike, mention_unstable_loop, stage_of
+from friso.interface.inputs import (
+    LOGGER,
+    Changes,
+    ExperimentName,
+    Seed,
+    StageLike,
+    mention_sampling,
+    mention_unstable_loop,
+    stage_of,
+)
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.virtual_rig.run import as_built_keys
-from friso.virtual_rig.task import SAMPLE_TIME
 
 MANY = 4
 """Smallest delay, in samples, that is mentioned."""
@@ -67,7 +75,7 @@ def rig(
 def _announce(stage: Stage) -> None:
     """Warn before the run of assumptions about the drive and of uncertain keys."""
     if stage.drive is None or stage.drive.sample_time is None:
-        LOGGER.warning(f"drive.sample_time is not given: {SAMPLE_TIME * 1e6:g} us, as in the thesis")
+        mention_sampling(stage)
     samples = whole_samples(as_built_keys(stage))
     if samples >= MANY:
         LOGGER.warning(

@@ -29,7 +29,7 @@ METRIC = Metric(
     words=(
         Word("cycle", "vermillion", label="a cycle attracts"),
         Word("swing", "pink", label="attracts, but not closed as an orbit"),
-        Word("unknown", "#8c6d8f", label="not certain what attracts"),
+        Word("unknown", "mauve", label="not certain what attracts", is_open=True),
         Word("nothing", "quiet", label="nothing attracts"),
     ),
     usual=True,

@@ -15,7 +15,7 @@ METRIC = Metric(
             "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
         ),
         Word("transient", "orange", "no cycle attracts, but this motion is not at rest by its end"),
-        Word("undecided", "#8c6d8f", "whether a cycle attracts, or where this motion ends, is not certain"),
+        Word("undecided", "mauve", "whether a cycle attracts, or where this motion ends, is not certain", is_open=True),
         Word("settles", "quiet", "no cycle attracts, and this motion comes to rest"),
     ),
     place=71,
