@@ -255,14 +255,15 @@ class Survey:
         """Close orbits from runs that repeat themselves; return the runs that still swing.
 
         The result has the numbers of runs that still swing without an attractor. With `early`, orbits are closed only
-        from runs that repeat well and resemble no unstable cycle.
+        in proofs, from runs that repeat well and resemble no unstable cycle: another round is cheaper.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
+            settled = ends.repeats.deviation < SurveySettings.current().settled_swing_share
+            ready &= settled & ~leave & self.prove
         if not self.prove:
             ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
