@@ -73,8 +73,8 @@ class LogContent:
     """Contents of a log file, before anything is identified.
 
     Fields are the title of the file's format, its channels or frequency response, and the kind of experiment with the
-    reason ("" if open). `read` has lines on how the file was read, `gaps` what the user must state before
-    identification, and `options` the options used for reading.
+    reason for it ("" if open). `read` has lines on how the file was read. `gaps` lists what the user must state before
+    identification, and `options` has the options used for reading.
     """
 
     path: Path

@@ -62,8 +62,8 @@ def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
     """Return the error of the inverse model with force and motion averaged alike.
 
-    The force is `lag` samples later, and both are averaged over `width` samples. The error serves as a check: averaging
-    the force alone merely hides fast residuals.
+    The force is `lag` samples later. `width` is negative; both are averaged over its size in samples. The error serves
+    as a check: averaging the force alone merely hides fast residuals.
     """
     if width >= 0:
         return np.inf

@@ -62,7 +62,7 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Return why logs hold force ramps from rest.
 
-    Returns None unless each has a ramp and all have enough together.
+    Returns None unless every log has a ramp, and all logs together have enough.
     """
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
@@ -70,7 +70,7 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
 
 
 def _partial(log: Log) -> bool:
-    """Tell whether a log has too few ramps to determine static friction by itself."""
+    """Tell whether a log alone has too few ramps to determine static friction."""
     return len(static_from_ramps(log).ramps.times) < ReadingSettings.current().fewest_ramps
 
 

@@ -88,7 +88,7 @@ def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, 
 
 
 def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates with their correlation in the fit."""
+    """Return the determined estimates with their correlation in the fit; none without estimates."""
     return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 

@@ -226,10 +226,10 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
-    """Make the result of the analysis from the `table` of all slips, one row per quantity.
+    """Make the result from the `table` of all slips: a row per quantity, a column per slip.
 
-    `why` says why a direction may have no slips. Static friction has only a lower bound if, before most slips, the pull
-    had stopped rising or the joint was at its stroke.
+    `pull` [N] and `velocity` [m/s] are the cart's over time. `why` says why a direction may have no slips. Static
+    friction has only a lower bound if, before most slips, the pull had stopped rising or the joint was at its stroke.
     """
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
@@ -276,7 +276,7 @@ def _answer(
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
-    """List notes for the reader of the result."""
+    """List notes on the zero of the force, on unequal directions, and on few slips."""
     notes = []
     if count and not offset.determined:
         notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")

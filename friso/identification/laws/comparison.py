@@ -65,7 +65,7 @@ class LawComparison:
 
     @property
     def explained(self) -> bool:
-        """Tell whether any law predicts the left-out parts of the record."""
+        """Tell whether the best law predicts the left-out parts of the record well enough."""
         return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property

@@ -197,7 +197,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 
 
 def _lost(base: Track) -> list[str]:
-    """Write how many samples were lost and interpolated; [] if none were."""
+    """Write how many samples were lost and interpolated, as a list of one line; [] if none were."""
     if not base.bridged.any():
         return []
     places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)

@@ -133,9 +133,10 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """Return the fields of a MATLAB structure, or a list of structures.
+    """Return a MATLAB structure as a dict, or an array of structures as a list of dicts.
 
-    `children` are the fields, converted. If all fields hold references, `item` is an array of structures.
+    `item` is the HDF5 group, and `children` are its fields, converted. If all fields hold references, `item` is an
+    array of structures.
     """
     import h5py
 

@@ -244,7 +244,7 @@ def _headings(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units per column from one or two lines above the numbers; () for none.
 
-    The numbers begin at line `first`, from 0, and stand in `columns` columns.
+    The numbers begin at line `first`, counted from 0, in as many columns as `columns` says.
     """
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]

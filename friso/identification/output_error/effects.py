@@ -18,9 +18,9 @@ from friso.intervals import COVERAGE
 class ExplainedResidual:
     """What additional forces, which the model leaves out, explain of a fit's residual.
 
-    `moved` is the shift of the fitted numbers, shape (free,); `sizes` are the fitted sizes of the forces; `left` is the
-    fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining residual, and `slopes` its
-    derivatives by numbers and sizes.
+    `moved`, shape (free,), is the shift of the fitted numbers. `sizes`, shape (forces,), are the fitted sizes of the
+    forces, and `left` is the fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining
+    residual, and `slopes`, shape (n, numbers + forces), its derivatives by numbers and sizes.
     """
 
     moved: np.ndarray
@@ -30,7 +30,7 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last force is present: its size differs from 0 by more than its error.
+        """Tell whether the last additional force is present: its size is not 0 within its error.
 
         The error allows for residuals that repeat at every reversal. With a slow sine, a coupling or a delay cannot
         then be told from slightly different friction.
@@ -82,7 +82,7 @@ def explained_by(
 
 
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
-    """Tell whether the last force is needed even if all parameters of the model may change.
+    """Tell whether the last of some additional forces is needed even if all parameters change.
 
     `forces` [N], shape (n,) each, have size 1; `units` are the sizes at which they are simulated.
     """

@@ -52,7 +52,7 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
 
 
 def _above(segment: dict[str, Any], key: str, column: int) -> Any:
-    """Return a header's value for a column; None if the header has no such key."""
+    """Return the value of a header's key above a column; None if the header lacks the key."""
     row = segment.get(key, [])
     return row[column] if 0 <= column < len(row) else None
 
