@@ -302,8 +302,9 @@ def _by_law(
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """Return the joint damping with which margins no longer limit the crossover.
 
-    The second result is the crossover [Hz] that is then possible. The damping is None if the crossover is that high
-    already, or if no damping tried helps.
+    The second result is the crossover [Hz] that is then possible. The damping is None if the crossover is nearly that
+    high already, or if no damping tried helps. The second result is then the highest crossover that specification and
+    leaf springs allow.
     """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec

@@ -187,7 +187,7 @@ def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
 
 
 def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
-    """Return the largest force along a leaf [N]: its share of the load, plus a moment's part.
+    """Return the largest force along a leaf [N]: its share of the load, plus a part by a moment.
 
     The moment acts about the width of the leaves.
     """

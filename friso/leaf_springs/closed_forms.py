@@ -47,12 +47,12 @@ def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
 
 
 def axial(mechanism: Mechanism) -> Any:
-    """Return E A of a leaf [N], including the stiffening by its clamps."""
+    """Return E A of a leaf [N], its stiffness against stretching, stiffened by its clamps."""
     return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
-    """Return 5/6 G A of a leaf in its plane [N], including the stiffening by its clamps."""
+    """Return the shear stiffness of a leaf in its plane, 5/6 G A [N], stiffened by its clamps."""
     return (
         SHEAR
         * mechanism.shear
@@ -250,7 +250,7 @@ def body_mass(mechanism: Mechanism) -> np.ndarray:
 
 
 def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
-    """Build symmetric matrices, shape (..., 6, 6), from entries by row and column.
+    """Build symmetric matrices, shape (..., 6, 6), from their entries by (row, column).
 
     The entries are on or above the diagonal; all others are 0.
     """

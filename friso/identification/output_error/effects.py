@@ -108,7 +108,7 @@ def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
-    """Return the fit with its intervals widened by `further`, shape (free,), each way."""
+    """Return the fit with intervals extended at both ends by `further`, shape (free,)."""
     return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 

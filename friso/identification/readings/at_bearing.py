@@ -193,7 +193,8 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 def cutoff_of(record: BearingRecord) -> float:
     """Choose the low-pass [Hz] of a record: the bandwidth of its motion, within limits.
 
-    It is at most a fraction of the sampling frequency, and at least some periods fit into the record.
+    The low-pass is at most a fraction of the sampling frequency, and at least so high that several of its periods fit
+    into the record.
     """
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
@@ -226,8 +227,8 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """Return the measured deflection [m] of a joint that bends.
 
-    Returns None if the deflection is not measured, or if the joint is held and deflects no more than its contact
-    `gives` [m].
+    Returns None if the deflection is not measured. Returns None as well if it hardly exceeds its noise, a fraction of
+    the motion, or what the contact of a held joint `gives` [m].
     """
     settings = ReadingSettings.current()
     measured = deflection(log)

@@ -145,7 +145,7 @@ def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
 
 
 def robust(values: np.ndarray) -> float:
-    """Return a robust standard deviation by the median absolute deviation; 0 without values."""
+    """Return the standard deviation by the median absolute deviation; 0 without values."""
     if not len(values):
         return 0.0
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))

@@ -165,9 +165,9 @@ def _covariance(
 ) -> np.ndarray:
     """Return the covariance (p, p) of a weighted least-squares solution.
 
-    `inverse` (p, n) leads from the forces to the solution. `scatter` is the residual's variance relative to the
-    `deviations` [N], used if above 1; `levels` are the columns for levels of friction, whose error does not average
-    out.
+    `inverse` (p, n) is the matrix that gives the solution from the forces. `scatter` is the residual's variance
+    relative to the `deviations` [N], used if above 1. `levels` are the columns for levels of friction, whose error does
+    not average out.
     """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T

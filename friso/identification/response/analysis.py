@@ -35,9 +35,12 @@ class Bench:
     """Results from the frequency responses of one machine.
 
     `driven` and `other` are the responses from force to position of the driven mass and, if measured, of the other
-    mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. `departs`, `drag` and `explanation`
-    describe the effect of friction at low frequency. `aside` has, for every log, the relative errors with which the
-    model of another log predicts its outputs. `warnings` say what was not found, and why.
+    mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. At low frequency, `departs` says where
+    friction bends the response off the mass line. `drag` is the friction that explains it, and `explanation` a
+    simulated test of this.
+
+    `aside` has, for every log, the relative errors with which the model of another log predicts its outputs. `warnings`
+    say what was not found, and why.
     """
 
     logs: tuple[Log, ...]
@@ -172,8 +175,8 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
     """Keep the spectral lines on which the response of any output stands out of the noise.
 
-    The responses are those of the driven mass and, if measured, of the other; the results, too. Raises InputError for
-    an output that stands out on no line.
+    The responses are those of the driven mass and, if measured, of the other mass; the second result is None without
+    the other. Raises InputError for an output that stands out on no line.
     """
     good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
     usable = [response.at(np.isin(response.frequency, good)) for response in responses]

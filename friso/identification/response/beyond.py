@@ -57,9 +57,9 @@ def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.nd
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
-    """Return value and deviation [ms^2] of the square of the time for which the force is held.
+    """Return value and standard deviation [ms squared] of the squared time of holding the force.
 
-    The force may be held for none of the sample time up to all of it.
+    They stand for a time between 0 and the whole sample time.
     """
     half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half

@@ -78,7 +78,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
-    """Return the sum of squares that a regression on columns, and a constant, leaves."""
+    """Return the sum of squares that a regression of `target` on columns and a constant leaves."""
     matrix = np.stack([np.ones(len(target)), *columns], axis=1)
     matrix /= np.linalg.norm(matrix, axis=0)
     residual = target - matrix @ np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
@@ -137,7 +137,7 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Merge passages through 1 into one, with the middle one's centre and the range of all."""
+    """Merge passages through 1 into one: the middle one's frequency, and the range of all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 

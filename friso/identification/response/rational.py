@@ -42,7 +42,10 @@ class RationalShape:
 
 
 class Row(NamedTuple):
-    """A model that was tried: its shape, parameters (p,), criterion, and sum of squares."""
+    """A rational model that was tried, with its parameters (p,).
+
+    `bic` is the Bayesian information criterion, and `squares` the sum of squares over variances.
+    """
 
     shape: RationalShape
     parameters: np.ndarray
@@ -114,7 +117,10 @@ def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.n
 
 
 def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return the response of a rational model at complex frequencies s [rad/s], shape (lines,)."""
+    """Return the response of a rational model, shape (lines,).
+
+    `s`, shape (lines,), is i times the frequency over a reference frequency, without unit.
+    """
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
@@ -164,7 +170,10 @@ def _another(
 def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Refine the nonlinear parameters; linear ones follow at each step (Golub, Pereyra 1973)."""
+    """Refine the nonlinear parameters of a model from a start, and return them.
+
+    At each step the linear parameters follow by least squares (Golub, Pereyra 1973).
+    """
     settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:

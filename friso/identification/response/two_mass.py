@@ -197,8 +197,9 @@ def _best(
 ) -> ResponseFit:
     """Fit a two-mass model from several starts; stop at the first good fit, else take the best.
 
-    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside`
-    bounds the parameters beyond the masses, and `held` keeps some near a value.
+    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside` has
+    the lower and upper bounds of delay, hold and compliances. `held` has prior values and deviations of parameters, by
+    index.
     """
     settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
@@ -247,7 +248,7 @@ def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
-    """Yield a sentence for each output whose sign was reversed, and for a poor fit."""
+    """Yield a sentence for each output whose sign was reversed, and one for a poor fit."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:

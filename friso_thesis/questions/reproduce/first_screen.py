@@ -88,7 +88,7 @@ class RemarkRow:
 
 
 def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[RemarkRow]:
-    """Return the remarks that apply.
+    """Return the remarks that apply, with the numbers that show it.
 
     A remark applies if this run has judged its criterion, with the result that the remark expects.
     """

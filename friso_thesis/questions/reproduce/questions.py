@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    `asked` names the section that asks, and `command` answers. A text says what the result means. `answer` is that for
-    the thesis's rig, from stored findings.
+    `asked` names the section that asks it. `command` is the command of friso that answers it, and `shows` says what the
+    result means. `answer` returns the answer for the thesis's rig, from stored findings.
     """
 
     asked: str

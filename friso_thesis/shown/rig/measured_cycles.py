@@ -258,7 +258,7 @@ def _motor(share: float) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """Return all results; arrays of runs have the shapes of `CycleComparison`."""
+    """Return all results for the JSON document; arrays of runs have the shapes of `CycleComparison`."""
     result: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}

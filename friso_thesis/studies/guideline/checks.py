@@ -1,6 +1,6 @@
 """Simulate samples for long below and above their edge of hunting.
 
-The question is whether all runs come to rest there, however they begin.
+The question is whether runs still swing below the edge, and come to rest above it, however they begin.
 """
 
 from __future__ import annotations

@@ -91,7 +91,10 @@ class Fit:
 
     @property
     def again(self) -> int:
-        """Return the number of samples that hunt in two or more separate ranges of the crossover."""
+        """Return the number of samples that hunt in two or more separate ranges of the crossover.
+
+        Samples of fit and test count.
+        """
         return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
@@ -159,8 +162,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 def safe_over_friction(locked: Fit) -> float:
     """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    A factor belongs to each range of the ratio of the law's two rates. The largest factor of all ranges in which the
-    rig may lie is returned.
+    Each range of the ratio of the law's two frequencies has a safe factor. The rig's friction may put it into several
+    ranges; the largest factor of these is returned.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]

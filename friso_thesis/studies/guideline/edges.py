@@ -77,7 +77,7 @@ class Edges:
 
 
 def concatenate_edges(parts: list[Edges]) -> Edges:
-    """Return the edges of all stages."""
+    """Return the edges of several groups of stages as one, in the order of the list."""
     return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
 
 

@@ -73,7 +73,10 @@ Exponent = tuple[int, str]
 
 @dataclass(frozen=True)
 class EdgeLaw:
-    """A law of the edge before the fit: the frequencies that enter it, and how they combine."""
+    """A law of the edge before the fit: the frequencies that enter it, and how they combine.
+
+    Its factors and exponents are still open.
+    """
 
     rates: tuple[Rate, ...]
     combine: Combine

@@ -98,8 +98,8 @@ class WorkedDesign:
 class IsolatorNeed:
     """Whether a machine with a crossover limit [Hz] needs an isolator.
 
-    An isolator is needed if the limit is below `edge` [Hz]. This is the highest locked edge by the law over the
-    friction range, multiplied by its safety factor.
+    An isolator is needed if the limit is below `edge` [Hz]. This is the highest edge by the law of the locked joint
+    over the friction range, times a safety factor.
     """
 
     limit: float

@@ -117,10 +117,10 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """Return how often and how slowly cycles swing, by the asymmetry of friction (`BINS`).
+        """Return how often and how slowly cycles swing, for each range of asymmetry in `BINS`.
 
-        All rails with random friction count. The first value is the fraction that still swings when the run ends, the
-        second the median of the periods over that of the even rail.
+        All rails with random friction count. A pair has the fraction of runs that still swing at the end, and the
+        median of their periods over that of the even rail (NaN: none swings).
         """
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):

@@ -56,7 +56,7 @@ class StrokeCrossover:
 
     @property
     def nearest(self) -> int:
-        """Return the index of the crossover nearest to the stage's own."""
+        """Return the index of the crossover on the grid that is nearest to the stage's own."""
         return int(np.argmin(abs(self.crossovers - self.frequency)))
 
     @property

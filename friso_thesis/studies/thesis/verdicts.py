@@ -120,7 +120,10 @@ def draws_text(share: Share, count: int, draws: int) -> str:
 
 
 def _listed(space: ClaimInSpace) -> str:
-    """Return the values on which a claim depends, the most decisive first."""
+    """Return the values on which a claim depends, the most decisive first, with the direction.
+
+    The direction tells whether the claim holds with more or with less of the value.
+    """
     either = {value.name: value for value in OPEN}
     words = []
     for item in space.hangs_on:

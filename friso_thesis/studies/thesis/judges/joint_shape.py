@@ -61,7 +61,7 @@ def judged_shortening(leaves: Evaluation) -> Finding:
 
 @judges("S341W", figure="Sec. 3.4.1, width and length")
 def width_against_length(evidence: Evidence) -> Finding:
-    """Judge the stiffnesses of leaves that are wider, and of leaves that are longer."""
+    """Judge what wider leaves, and longer leaves, change in the stiffness of drive and supports."""
     return judged_dimensions(*(_ratios(name) for name in ("width", "length")))
 
 

@@ -96,7 +96,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
-    """Judge the first mode other than the drive mode, over the parameters left open."""
+    """Judge the frequency of the first mode other than the drive mode, for all values left open."""
     words = reading()
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     visible = np.array(

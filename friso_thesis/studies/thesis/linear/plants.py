@@ -63,7 +63,7 @@ class LimitCase:
 
 @dataclass(frozen=True)
 class Springs:
-    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the resting plant (`both`)."""
+    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the plant at rest (`both`)."""
 
     joint: float
     bristles: float
@@ -79,9 +79,9 @@ def springs_of(flat: Mapping[str, Any]) -> Springs:
 
 
 def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
-    """Return all limit cases by name.
+    """Return the plant in all limit cases, by name.
 
-    Cases with a touched limiter are also given by the formula of Table 1, with "-series" appended.
+    Cases with a touched limiter are also computed by the formula of Table 1, with "-series" appended to the name.
     """
     cases = limit_cases(flat)
     series = limiter_in_series(flat)

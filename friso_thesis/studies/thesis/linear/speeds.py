@@ -74,7 +74,7 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
-    """Tell whether, in the middle of some range, no faster controller is stable."""
+    """Tell whether no faster controller is stable in the middle of at least one unstable range."""
     settings = FrequencySettings.current()
     crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])
