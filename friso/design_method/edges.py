@@ -112,7 +112,7 @@ class OtherLaws:
 
 
 def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with the friction keys of another law."""
+    """Return the stage's keys with all friction keys replaced by those of another law."""
     return {**{key: value for key, value in flat.items() if not key.startswith("friction.")}, **friction}
 
 

@@ -86,8 +86,8 @@ class NoDesign(Exception):
 class LeavesAndCrossover:
     """Leaf springs and a crossover that fit each other.
 
-    It holds the task for which the leaves were chosen, the choice, and the stage with both. `comfortable` are the
-    ranges of crossovers [Hz] with a modulus margin of at least 0.5.
+    Fields are the task for which the leaves were chosen, the choice, and the stage with leaves and crossover.
+    `comfortable` are the ranges of crossovers [Hz] with a modulus margin of at least 0.5.
     """
 
     task: LeafTask
@@ -200,7 +200,7 @@ class DesignInterrupted(KeyboardInterrupt):
 class NotNeeded(Exception):
     """Raised by a design if the machine needs no isolator and none is wanted anyway.
 
-    It holds the design `so_far`.
+    `so_far` is the design up to then.
     """
 
     def __init__(self, so_far: UnfinishedDesign) -> None:

@@ -90,7 +90,7 @@ class LogContent:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Return the lines of `read` about lost parts of the file."""
+        """Return the lines of `read` that tell of parts of the file left out or missing."""
         return tuple(line for line in self.read if line.startswith("left out") or " ends early: " in line)
 
 

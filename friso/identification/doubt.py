@@ -205,7 +205,7 @@ class FitCase(FittedCase):
         return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
-        """Return the case with a finding and its consequences for the fit."""
+        """Return the case with a finding added, and its consequences for the fit applied."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
@@ -406,5 +406,5 @@ def _at(moment: Moment) -> list[str]:
 
 
 def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
-    """Yield the findings of the doubt `name`, marked with its name."""
+    """Yield the findings of the doubt `name`, each with this name in its field `doubt`."""
     return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))

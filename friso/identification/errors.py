@@ -89,7 +89,7 @@ def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float)
 
 
 def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
-    """Return the norm of a difference over the norm of the measured signal."""
+    """Return the norm of measured minus simulated values over the norm of the measured ones."""
     return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
 
 

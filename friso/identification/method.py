@@ -248,7 +248,7 @@ def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
 
 
 def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
-    """List notes on the results for the engineer, by kind."""
+    """List notes of the kinds of experiment on their results, for the engineer."""
     results: dict[str, list[Any]] = {}
     for experiment in experiments:
         results.setdefault(experiment.kind, []).append(experiment.result)

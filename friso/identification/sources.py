@@ -100,7 +100,7 @@ def read_usable(
 
 
 def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
-    """Add to an error about a log that its stored mapping may be the cause."""
+    """Return an error about a log with the hint that its stored mapping may be the cause."""
     try:
         kept = "" if is_frequency_response(path) else (load_mapping(path, folder) or Mapping()).beside(options).words
     except InputError:
@@ -254,7 +254,7 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
 
 
 def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
-    """Read a log with the signals that a kind of experiment needs."""
+    """Read a log with the signals that a kind of experiment needs, in the units that it needs."""
     chosen = KINDS[kind]
     return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
 

@@ -113,7 +113,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    """List the finite ends of an estimate, each named "at least" or "at most"."""
+    """List the finite ends of an estimate's interval, each as ("at least" or "at most", value)."""
     return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
 
 

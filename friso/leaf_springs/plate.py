@@ -60,7 +60,7 @@ class Curl:
         return cls(poisson, (fast, slow), (a, at_clamp[0] - a), odd)
 
     def shape(self, s: Any, length: Any, derivative: int = 0) -> Any:
-        """Return m - a h1 - b h2 at s, or its second derivative."""
+        """Return m - a h1 - b h2 at s or, if `derivative` is 2, its second derivative."""
         moment = (s if self.odd else 1.0) if derivative == 0 else 0.0
         terms = (
             weight * rate**derivative * _decay(rate, s, length, self.odd)

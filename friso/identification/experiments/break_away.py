@@ -75,7 +75,7 @@ def _partial(log: Log) -> bool:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
-    """Analyse a log of force ramps, with the moving mass known beforehand."""
+    """Analyse a log of force ramps, with the moving mass from experiments or the stage file."""
     (log,) = logs
     assert isinstance(log, Log)
     return static_from_ramps(log, sum(prior.masses(log)))

@@ -150,7 +150,7 @@ def _pull(
 ) -> tuple[np.ndarray, float]:
     """Return the low-passed force on the cart [N], and the relative error of its scale.
 
-    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`. Raises
+    The force is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`. Raises
     InputError for a stiffness that is not positive, and if the log has neither signal.
     """
     if stiffness is None:
@@ -203,7 +203,7 @@ def _peak(
 
 
 def _unseen(speed: np.ndarray) -> float:
-    """Count the samples for which motion may have been hidden in noise.
+    """Estimate for how many samples before its first visible one a motion was hidden in noise.
 
     `speed`, shape (n,), runs from the first visible sample to the maximum. Before, it is taken to have doubled in equal
     times, as in its first visible doubling. An evenly accelerating body would be hidden for less.
@@ -328,7 +328,7 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     """Return half of the difference between forward and backward break-away force.
 
-    It is not determined if the cart slips in one direction only.
+    The offset is not determined if the cart slips in one direction only.
     """
     name, method = (
         "offset of the force on the cart",

@@ -100,7 +100,7 @@ def _worse(differences: np.ndarray, level: float) -> bool:
 
 
 def comparable() -> list[str]:
-    """List the laws with stiction that measured friction can be converted into."""
+    """List the friction laws with stiction to which measured friction can be converted."""
     return [
         name
         for name, law in FRICTION.classes.items()

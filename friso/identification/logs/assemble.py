@@ -121,7 +121,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
-    """Write lines on the origin of the sample times."""
+    """Write lines that say where the sample times of the log come from."""
     if reading.mapping.sample_time is not None:
         return [
             f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
@@ -218,6 +218,6 @@ def _spans(base: Track) -> str:
 
 
 def _instant(base: Track, number: int) -> str:
-    """Write the time of a sample; rounding errors at the beginning become 0."""
+    """Write the time of a sample [s], by its number; rounding errors about 0 become 0."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

@@ -227,7 +227,7 @@ def _plain(node: Any) -> Any:
 
 
 def most_bytes(size: int) -> int:
-    """Return the largest pickled size of the contents of a file of a given size."""
+    """Return how many bytes a file's pickled contents may have, by the file's `size` [B]."""
     return MOST + PER_BYTE * size
 
 

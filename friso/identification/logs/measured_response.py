@@ -38,9 +38,10 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """Return the kind of a response's column by its heading; None for other columns.
+    """Return what a column of a response holds, such as "phase", by its heading, or None.
 
-    Text before brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
+    Others are coherence, imaginary and real part, magnitude and frequency. Text before brackets counts first ("FRF
+    (real)", "Magnitude (re 1 N)").
     """
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
     shown = (set(words(text)) for text in (re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name), name))

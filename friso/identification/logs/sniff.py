@@ -136,7 +136,7 @@ def is_number(cell: str, decimal: str) -> bool:
 def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
     """Tell whether cells, of which some are `numeric`, are a row of values.
 
-    A row has numbers, gaps and time stamps, and with `words` a few words (a state).
+    A row has numbers, empty cells and time stamps. With `words`, it may have a few words instead, such as a state.
     """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]

@@ -47,8 +47,8 @@ def explained_by_forces(
 ) -> ExplainedResidual | None:
     """Fit additional forces to the residual of a fit, while its parameters may change, too.
 
-    Each force [N], shape (n,), has size 1; it is simulated at its size in `units`, small enough to be linear. Returns
-    None if the forces explain no more than the best of `searched` random ones.
+    A force [N], shape (n,), is that of an effect of size 1. It is simulated at its size in `units`, small enough to be
+    linear. Returns None if the forces explain no more than the best of `searched` random ones.
     """
     rest, slopes = fit.linearised
     return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
@@ -115,7 +115,8 @@ def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
 def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
     """Return the change of a fit's residual per unit of each additional force, shape (n,) each.
 
-    Each force [N], shape (n,), has size 1 and is simulated at its size in `units`. All are simulated side by side.
+    A force [N], shape (n,), is that of an effect of size 1, and is simulated at its size in `units`. All forces are
+    simulated side by side.
     """
     inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
     pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))

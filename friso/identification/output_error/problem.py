@@ -35,7 +35,7 @@ PASSES = 5 / 8
 class Simulated:
     """Simulated records of position, velocity and the controller's force, in SI units.
 
-    Each has the shape (runs, n), or (n,) of one run, and is NaN after a failure.
+    All records have the shape (runs, n), or (n,) for one run, and are NaN after a failure.
     """
 
     position: np.ndarray
@@ -84,8 +84,8 @@ class Problem:
     def noise_left(self, noise: float) -> float:
         """Return the RMS residual [N] that noise alone leaves, if the force has this `noise` [N].
 
-        In closed loop the residual is the noise itself. For a stage that follows the log it is the noise passed by the
-        guiding controller, (2 w s + w^2) / (s + w)^2, plus the controller's response to position noise.
+        In closed loop the residual is the noise itself. For a stage that follows the log, the guiding controller passes
+        only slow noise. The controller's response to position noise is added.
         """
         if self.closed:
             return noise
@@ -128,7 +128,7 @@ class Problem:
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
-        """Simulate one run; its signals have the shape (n,)."""
+        """Return the simulated record for fitted numbers (parameters,); its signals are (n,)."""
         ((_, record),) = self.simulated(inner[None])
         return Simulated(record.position[0], record.velocity[0], record.force[0])
 

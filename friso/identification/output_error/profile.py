@@ -62,9 +62,9 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
-    """Fit the other parameters at each of the `values` of one, the parameter `number`.
+    """Fit all other parameters at each of the `values` of the parameter with the index `number`.
 
-    A fit whose mean square would stay above `limit` is abandoned.
+    The `others` are indices. A fit whose mean square would stay above `limit` is abandoned.
     """
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)

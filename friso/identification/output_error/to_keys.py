@@ -122,7 +122,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
-    """Return the keys of the stage file for fitted numbers."""
+    """Return the keys of the stage file with the SI values that follow from fitted numbers."""
     values = {
         parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
     }

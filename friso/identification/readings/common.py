@@ -164,7 +164,7 @@ def noise_of(signal: np.ndarray) -> float:
 def _median(sizes: np.ndarray, digit: float) -> float:
     """Return the median of sizes that were rounded to multiples of `digit` (grouped data).
 
-    Each rounded size stands for all sizes within half a digit of it, none below 0.
+    A rounded size stands for all sizes within half a digit of it, none below 0.
     """
     middle = float(np.median(sizes))
     low = max(middle - digit / 2, 0.0)

@@ -241,7 +241,7 @@ class _Grid:
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
     """Return the range of grid points that lie inside, widened by half a step on each side.
 
-    `points` ascend evenly, with `ratios` by ratio; the mask `inside` has their shape.
+    `points` ascend by equal differences or, if `ratios`, by equal ratios. The mask `inside` has their shape.
     """
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points

@@ -225,7 +225,7 @@ def _single(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to one realisation, number `which`."""
+    """Fit the two-mass model to a single realisation, the one with the index `which` in `logs`."""
     responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
     return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
 

@@ -88,7 +88,7 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
     """Describe where estimates without and with the reference differ beyond their deviations.
 
-    Both must have the same spectral lines. The result is empty if they agree.
+    Both responses must have the same spectral lines. The result is empty if they agree.
     """
     settings = ResponseSettings.current()
     _same_lines(direct, indirect)

@@ -198,7 +198,7 @@ def _completed(
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
     """Return the poles of the modes and the zeros of the response with positive imaginary part.
 
-    Both are relative to the scale of s.
+    Poles and zeros are relative to the scale of s, a reference frequency.
     """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

@@ -144,8 +144,8 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
     """Write sentences on periods left out: those with another input, and transient ones.
 
-    `alike` marks the periods with equal input, of which the `first` are transient. Nothing is yielded if none is left
-    out.
+    `alike`, shape (periods,), marks the periods with equal input; the `first` ones of these are transient, by number.
+    Nothing is yielded if no period is left out.
     """
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"

@@ -49,7 +49,7 @@ class TwoMass:
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
         """Return the complex response of one mass, shape (n,), at frequencies [Hz], shape (n,).
 
-        It is the driven mass if `collocated`, otherwise the other mass, which must have been fitted.
+        If `collocated`, the mass is the driven one, otherwise the other one, which must have been fitted.
         """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
@@ -242,7 +242,7 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return a start with masses, stiffness and damping scaled to the response."""
+    """Return a start with masses, stiffness and damping scaled together to fit the response."""
     scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
     return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
@@ -258,7 +258,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
 
 
 def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Convert a fit to estimates of masses and joint, and of derived quantities."""
+    """Return estimates of masses, joint, friction and delay, antiresonance and resonance."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"
 

@@ -107,5 +107,5 @@ def as_far(verdict: ClaimVerdict) -> str:
 
 
 def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
-    """Return the claims that hold, of those that the thesis itself lists."""
+    """Return the verdicts on claims that hold and are in the thesis's own list of conclusions."""
     return [verdict for verdict in verdicts if verdict.judgement == "holds" and verdict.claim.listed]

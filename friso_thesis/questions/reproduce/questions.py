@@ -129,9 +129,9 @@ _PARASITIC, _LARGEST = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
-    """Return the steps of Sec. 3.4.
+    """Return the steps of the thesis's design method (Sec. 3.4), one row each.
 
-    Each has what the thesis does, what friso finds at the thesis's values, and what `friso design` makes of the
+    A row has what the thesis does, what friso finds at the thesis's values, and what `friso design` makes of the
     specification (stored).
     """
     single = reproduction.linear.locked.single if reproduction.linear else None

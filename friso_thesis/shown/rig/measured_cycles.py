@@ -110,7 +110,7 @@ def _irregular(result: CycleComparison) -> str:
 
 
 def _levels(result: CycleComparison) -> str:
-    """Say whether other friction levels make the cycle as slow."""
+    """Say whether other friction levels, or a weaker motor, make the cycle as slow as measured."""
     slow, swing = result.slower(result.levels), result.larger(result.levels)
     matches = np.argwhere(result.as_measured(result.levels))
     if not len(matches):
@@ -258,7 +258,7 @@ def _motor(share: float) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """Return all results for the JSON document; arrays of runs have the shapes of `CycleComparison`."""
+    """Return all results; arrays of runs have the shapes of `CycleComparison`."""
     result: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}

@@ -102,9 +102,9 @@ class Fit:
 class Guideline:
     """All results of the guideline, as in `docs/evidence/guideline.md`.
 
-    They are the number of dimensionless groups by part of the stage, both laws, the worked steps, and what a parasitic
-    mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps
-    came from an interrupted run.
+    Fields are the numbers of dimensionless groups by part of the stage, both laws, the worked steps, and what a
+    parasitic mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of
+    the sweeps came from an interrupted run.
     """
 
     samples: int
@@ -219,7 +219,7 @@ def checked_samples(samples: int) -> None:
 def group_counts() -> dict[str, Count]:
     """Return the numbers of parameters and dimensionless groups of three structures, by name.
 
-    They are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
+    The structures are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
     """
     return {
         "rigid": group_count(plain_rig()),

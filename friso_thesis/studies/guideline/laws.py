@@ -50,8 +50,8 @@ SampleValues = Mapping[str, np.ndarray]
 class Rate:
     """A frequency that enters a law of the edge, in units of sqrt(sigma_0/m).
 
-    It is a factor times dimensionless groups to the fixed powers of `base`, times further groups over their references
-    to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
+    The frequency is a factor times dimensionless groups to the fixed powers of `base`, times further groups, relative
+    to reference values, to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
     """
 
     name: str

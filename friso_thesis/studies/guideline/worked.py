@@ -142,7 +142,10 @@ class Worked:
 
 
 def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
-    """Return the friction forces [N] that the rig may have."""
+    """Return the pairs of static and Coulomb friction [N] that the rig may have, as keys.
+
+    Each static friction is combined with each of the `gaps`, fractions of it.
+    """
     return [{"friction.static": force, "friction.coulomb": force * (1 - gap)} for force, gap in product(STATIC, gaps)]
 
 

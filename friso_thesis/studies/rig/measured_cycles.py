@@ -256,7 +256,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
 
 
 def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
-    """Return cycles with one property changed, by the name of the property."""
+    """Return the cycle on an even rail after one change of the stage, by name of the change."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}

@@ -47,7 +47,7 @@ class StrokeCrossover:
     def share(self) -> np.ndarray:
         """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers).
 
-        It is NaN where all runs failed.
+        The fraction is NaN where all runs failed.
         """
         done = ~self.runs.failed
         count = done.sum(axis=2)

@@ -194,7 +194,7 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
-    """Return the finding of a judge if the thesis's peak count decides whether a stage hunts."""
+    """Return a judge's finding by the thesis's criterion: a stage hunts if peaks are counted."""
     return entry.judge(by_way(base, by_peak_count))
 
 
@@ -314,7 +314,7 @@ def _fit(
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
-    """Return the printed numbers of a claim, with the numbers found."""
+    """Return the numbers that the thesis prints for a claim, beside those of a finding."""
     return [
         PrintedNumber(claim, part.criterion, part.printed, part.read)
         for part in finding.parts

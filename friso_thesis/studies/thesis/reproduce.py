@@ -191,7 +191,7 @@ def _survey_work(study: ThesisStudy) -> int:
 
 
 def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
-    """Return the verdict on a claim that is not judged in this run."""
+    """Return the verdict "not covered" on a claim that is not judged here, with the reason."""
     entry = registered().get(claim.id)
     if entry is None:
         return not_covered(claim, "no judge decides on it")

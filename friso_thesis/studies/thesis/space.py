@@ -49,7 +49,7 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Tell whether changing the value may change the study's map."""
+        """Tell whether changing the value may change a study's map: the study must not set its keys."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:

@@ -167,7 +167,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Say how a second finding judges the claim, with the number in each part that it turns."""
+    """Say how a second finding judges the claim, with the numbers of the criteria that it turns."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

@@ -58,7 +58,7 @@ def _above(segment: dict[str, Any], key: str, column: int) -> Any:
 
 
 def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
-    """Return `n` instants from `start` on, `step` apart; None without a step."""
+    """Return `n` instants [s] from `start` on; None without a start or a positive `step`."""
     return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
 
 

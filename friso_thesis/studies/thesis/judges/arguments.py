@@ -139,7 +139,7 @@ def close_to_ten_g(evidence: Evidence) -> Finding:
 def why_mass_helps(evidence: Evidence) -> Finding:
     """Judge why mass helps, by the first slip across the reference after the return move.
 
-    Both masses have the same crossover.
+    A light and a heavy stage with the same crossover are compared.
     """
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY

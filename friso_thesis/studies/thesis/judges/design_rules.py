@@ -171,7 +171,7 @@ def _locked_edge() -> str:
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
-    """Judge from which crossover the isolated and the locked rig come to rest."""
+    """Judge from which crossover the isolated rig, and from which the locked rig, comes to rest."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")

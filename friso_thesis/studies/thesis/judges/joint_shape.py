@@ -68,7 +68,7 @@ def width_against_length(evidence: Evidence) -> Finding:
 def _ratios(dimension: str) -> tuple[float, float, float]:
     """Return by which factors a larger `dimension` of the leaves changes three stiffnesses.
 
-    They are those of the drive, along the leaves, and along their width.
+    The stiffnesses are those of the drive, along the leaves, and along their width.
     """
     own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)

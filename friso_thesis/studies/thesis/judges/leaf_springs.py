@@ -34,7 +34,7 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
-    """Evaluate the thesis's leaves for all values that it leaves open."""
+    """Evaluate the thesis's leaf springs for all combinations of values that it leaves open."""
     return tuple(beams(mechanism(*variant), STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 

@@ -67,7 +67,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """Judge whether the cells of stroke 0 behave as the locked rig does."""
+    """Judge whether the rig with stroke 0 has as many counted peaks as the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["count"].values

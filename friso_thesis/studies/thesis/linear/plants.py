@@ -71,7 +71,7 @@ class Springs:
 
 
 def springs_of(flat: Mapping[str, Any]) -> Springs:
-    """Return the springs of a stage whose cart is stuck, its limiter free."""
+    """Return the stiffnesses of joint and bristles, and of the plant with the cart stuck."""
     machine = plant(flat, limit_cases(flat)["stuck"]).take((FORCE,), (STAGE,))
     both = float(1 / abs(machine.at(np.zeros(1))[0, 0, 0, 0]))
     bristles = friction_law(flat["friction.model"]).shown(flat).stiffness

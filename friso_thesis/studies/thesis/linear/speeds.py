@@ -31,10 +31,11 @@ CROSSOVERS = 25
 class Speeds:
     """Stability of the loop with the cart at prescribed speeds [m/s].
 
-    - `unstable`: ranges of speed in which it is unstable with the limiter free; `unstable_touched`: with it touched.
+    - `unstable`: ranges of speed in which the loop is unstable with the limiter free; `unstable_touched`: with it
+      touched.
     - `undeflected`: these ranges with bristles that the motion has not deflected yet (z = 0), where a linearisation
       about an initial speed begins.
-    - `incurable`: whether, in the middle of the range, no faster controller up to 10 kHz is stable.
+    - `incurable`: whether no faster controller, up to 10 kHz, is stable in the middle of at least one unstable range.
     - `slow`, `fast`: ratio of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth
       and at ten times the crossover.
     """
