@@ -77,7 +77,10 @@ def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
 
 
 def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
-    """Describe the residual force [N], (n,), over a motion sampled every `sample_time` [s]."""
+    """Describe the residual force [N], (n,), of a fit sampled every `sample_time` [s].
+
+    `moved` is the filtered motion of these samples.
+    """
     alike = correlation_length(residual)
     return Residual(
         float(np.sqrt(np.mean(residual**2))),

@@ -324,5 +324,5 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
 
 
 def _first(count: int, step: int) -> int:
-    """Return the first row to keep when thinning rows, so that the last row is kept too."""
+    """Return the first row to keep so that, at every `step`th of `count`, the last one is kept."""
     return (count - 1) % step

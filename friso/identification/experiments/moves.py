@@ -118,7 +118,7 @@ def _span(log: Log) -> str:
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
-    """Simulate another log with a reference; return None if the machine's own loop is not known."""
+    """Simulate another log; None if it lacks a reference, or the own loop is not simulated."""
     if "reference" not in log or result.loop is None:
         return None
     return simulated_log(result, log, prior.flat(log) or None)
@@ -127,7 +127,8 @@ def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: Analysis
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
     """Check that logs can be identified in the machine's loop, and another log simulated.
 
-    Raises InputError otherwise.
+    The user must have given the stage. One of the logs needs a reference, and the other log position, force and
+    reference. Raises InputError otherwise.
     """
     check_roles(other, ("position", "force", "reference"))
     prior.flat(other)

@@ -194,9 +194,10 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Return the scales of the five fitted numbers, in the order of `_Equation`.
+    """Return the scales of the five fitted numbers, in the order of `_Equation`, shape (5,).
 
-    Forces have the mean size of the force [N], the Stribeck velocity the RMS velocity [m/s].
+    Forces have the mean size of the record's force [N], below `cutoff` [Hz]; the Stribeck velocity has the RMS velocity
+    [m/s].
     """
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])

@@ -134,7 +134,10 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
 
 
 def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
-    """Bring one role's channel to even instants, and add its remarks to the notes."""
+    """Bring one role's channel, with its instants [s] and values, to even instants.
+
+    Its remarks are added to the notes.
+    """
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
@@ -171,7 +174,7 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
-    """List warnings about the signals for the engineer.
+    """List warnings for the engineer about the signals of a log.
 
     Signals may be constant or clipped, and position may contradict velocity or lag behind the force. `base` has the
     common instants.

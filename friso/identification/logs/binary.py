@@ -232,7 +232,7 @@ def most_bytes(size: int) -> int:
 
 
 def _too_much(size: int, most: int) -> str:
-    """Return the message on a file that would take too much memory."""
+    """Return the message on a file of a `size` [B] that would take over `most` bytes of memory."""
     return f"it would take {size / 1e6:.0f} MB of memory, and a file of its size has at most {most / 1e6:.0f} MB"
 
 

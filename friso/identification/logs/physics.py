@@ -134,7 +134,11 @@ def _filled(channel: Channel) -> np.ndarray | None:
 
 
 def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, moved: np.ndarray) -> MotionReading:
-    """Fit inertia and friction to a pair of channels, at several time scales."""
+    """Fit inertia and friction to a pair of channels, at several time scales.
+
+    `values` and `moved`, shape (n,), are the samples of force and motion, without gaps. `kind` tells whether the motion
+    is a position or a velocity.
+    """
     settings = LogSettings.current()
     rows = []
     while len(values) >= settings.samples_of_a_reading:

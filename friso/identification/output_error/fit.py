@@ -136,9 +136,10 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Pro
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """Fit several problems that differ only in the samples that count, from the same starts.
+    """Fit several problems that differ only in the samples that count, from equal starts.
 
-    The starts are simulated once for all of them.
+    The starts, shape (starts, parameters), are simulated once for all problems. `free` has the indices of the
+    parameters to fit.
     """
     pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
     ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
@@ -238,7 +239,7 @@ def _ranked(
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
-    """Choose the stretches of a record over which starts are simulated.
+    """Return the stretches of a record over which `starts` starts are simulated.
 
     A short record is used whole. Of a long one in closed loop the beginning is used, because its later state is
     unknown; otherwise stretches from all over it, because slow motion may come last.

@@ -238,7 +238,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
 
 
 def why_not_shown(name: str, covered: Coverage) -> str:
-    """Return in a sentence why a parameter is not determined."""
+    """Return in a sentence why a record does not determine the parameter `name`."""
     if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):

@@ -195,7 +195,7 @@ def digit_of(signal: np.ndarray) -> float:
 
 
 def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
-    """Return the samples at which a motion [m], shape (n,), turns back by more than `swing` [m]."""
+    """Return the samples at which a motion [m] turns, to go back by more than `swing` [m]."""
     turns, values = [], position.tolist()
     lowest = highest = values[0]
     low = high = 0

@@ -93,8 +93,8 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
     """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    Inertia is subtracted. Where the velocity swings, the mean friction errs in proportion to the squared relative
-    swing, which widens the interval.
+    Inertia, `mass` [kg] times the remaining acceleration, is subtracted. The relative swing is the standard deviation
+    of the velocity over the velocity.
     """
     return (
         stretch.velocity,
@@ -176,9 +176,10 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Return the standard deviation [N] that all forces share, from their half-widths [N].
+    """Return the standard deviation [N] that all forces share, as read over the same places.
 
-    Forces share it because they were read over the same places.
+    This is the weighted RMS of the deviations that follow from their half-widths `errors` [N]. The weights follow from
+    `deviations` [N].
     """
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 

@@ -128,7 +128,7 @@ class _Grid:
     """
 
     def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
-        """Solve the grid; its points have the shapes (velocities,) and (exponents,)."""
+        """Solve the grid of Stribeck `velocities` [m/s], (velocities,), and exponents `shapes`."""
         self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
         speeds = forces.speeds
         decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))

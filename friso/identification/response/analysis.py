@@ -160,7 +160,7 @@ def _record(log: Log, output: str) -> ResponseRecord:
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
     """Estimate a response by averages over periods, or by local polynomials if nothing repeats.
 
-    Channels are named as in the log.
+    `records` are the realisations; input and output are named as the log's channels.
     """
     channels = from_log(log, "force", output)[1]
     try:
@@ -201,7 +201,7 @@ def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRan
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """Return the highest frequency [Hz] of the response, plus rounding so that it is included."""
+    """Return the upper end of a band [Hz] that includes the highest frequency of the response."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -213,7 +213,10 @@ def _of_all(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to all realisations, and widen intervals to their scatter."""
+    """Fit the two-mass model to all realisations, and widen intervals to their scatter.
+
+    The scatter is that of fits to single realisations.
+    """
     apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
     return widened(fit_two_mass(driven, other, band), apart)
 
@@ -240,7 +243,10 @@ def _friction(
 ) -> tuple[Drag | None, Explanation | None]:
     """Return the friction that bends the response off the mass line, and a test of it.
 
-    The test is a simulation with the estimated friction. Either is None if it fails; `warnings` then get the reason.
+    The test is a simulation with the estimated friction. Either result is None if it fails; `warnings` then get the
+    reason.
+
+    Either is None if it fails; `warnings` then get the reason.
     """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None

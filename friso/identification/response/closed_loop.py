@@ -37,9 +37,10 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return input and output without the part that repeats periodically.
+    """Return input and output without the part that repeats from period to period.
 
-    The input is None if nothing is left of it.
+    If the input does not repeat, both signals are returned unchanged. If nothing is left of the input, both results are
+    None.
     """
     try:
         periods = find_periods(record.input)

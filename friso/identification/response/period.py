@@ -118,7 +118,8 @@ def _lowest(change: np.ndarray, lag: int) -> int:
 def _near(change: np.ndarray, expected: float) -> int:
     """Return the lag within 2 % of an expected one at which the signal repeats best.
 
-    Raises InputError if it does not repeat there, or if the expected lag is beyond half the record.
+    `change` is how much the signal changes over each lag. Raises InputError if it does not repeat there, or if the
+    expected lag is beyond half the record.
     """
     low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
     if not 2 <= expected < len(change):

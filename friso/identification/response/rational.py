@@ -54,10 +54,10 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Fit models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
+    """Fit rational models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
 
-    The models have a `rigid` body or not. The last result is the best of these models with a constant added. `s` are
-    complex frequencies over a scale, (lines,).
+    The models have a `rigid` body or not. They are fitted to `values` with their `deviation` at complex frequencies `s`
+    over a scale, (lines,) each. The last result is the best of these models with a constant added.
     """
     rows: list[Row] = []
     nonlinear = np.zeros(2)
@@ -188,7 +188,7 @@ def _eliminated(
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """Make the tried model, with linear parameters, criterion and sum of squares."""
+    """Make the tried model from its nonlinear parameters: all parameters, `bic` and `squares`."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)

@@ -143,7 +143,7 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def _sign(response: np.ndarray) -> float:
-    """Return 1 if the mass follows the force (-180 degrees) on most lines, else -1."""
+    """Return 1 if the mass follows the force (-180 degrees), on average over the lines, else -1."""
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 

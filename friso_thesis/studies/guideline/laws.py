@@ -183,7 +183,11 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
 
 
 def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
-    """Fit a law to edges, shape (count,); cross-validation chooses its exponents."""
+    """Fit a law to edges, shape (count,); cross-validation chooses its exponents.
+
+    `values` are the samples' dimensionless groups by name. `locked`, shape (count,), is the edge with the joint locked,
+    for a law that needs it.
+    """
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
     folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS

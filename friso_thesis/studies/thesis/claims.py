@@ -195,8 +195,9 @@ def judges(
 ) -> Callable[[Judge], Judge]:
     """Register the decorated function as judge of a claim.
 
-    `undrawn` are assumed values that decide on the claim but are in no draw of open values. A claim `of_runs` is not
-    judged by attractors. Raises ValueError for an unknown or taken claim.
+    `figure` shows its evidence, and `needs` names the evidence. `undrawn` are assumed values that decide on the claim
+    but are in no draw of open values. A claim `of_runs` is not judged by attractors. Raises ValueError for an unknown
+    or taken claim.
     """
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")

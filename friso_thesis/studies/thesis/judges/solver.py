@@ -92,7 +92,11 @@ def _counted(cell: xr.Dataset) -> Counted:
 
 
 def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
-    """Judge runs by name: by ode23s, and by friso at the tight tolerance and at the thesis's."""
+    """Judge whether ode23s and friso count equal peaks and swings in the same runs.
+
+    All arguments have runs by name: `theirs` by ode23s, `tight` by friso at a tight tolerance, and `loose` by friso at
+    the thesis's.
+    """
     words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]

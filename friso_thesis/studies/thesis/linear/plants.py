@@ -101,7 +101,10 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Return at which frequencies [Hz] the plant has peaks, or dips if `sign` is -1."""
+    """Return at which frequencies [Hz] the plant of a limit case peaks, or dips if `sign` is -1.
+
+    `omega` [rad/s] are the frequencies searched.
+    """
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))
