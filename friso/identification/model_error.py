@@ -50,7 +50,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
 
 
 def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
-    """Map stage-file keys to quantities of the inverse model, with the conversion factor."""
+    """Return quantity of the inverse model, and factor from it to the key, by stage-file key."""
     bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
     total = sum(flat[key] for key in bodies)
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"

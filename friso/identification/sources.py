@@ -147,7 +147,7 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     """Keep a force in its logged unit, such as volts, for kinds analysed per unit of force.
 
     `beside` is the axis of a given stage file, or None. Files of other kinds, or with a force in newtons, are returned
-    unchanged. Raises InputError for such a force beside a stage file, whose numbers are in newtons.
+    unchanged. Raises InputError for a force in another unit beside a stage file, whose numbers are in newtons.
     """
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):

@@ -76,8 +76,8 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the width [N/m] while all other coordinates are held.
 
     The stiffness contains bending and shear in the plane of the leaves. A force across a leaf under a `deflection` [m],
-    delta, also twists it by 4 delta (s/L)^3, with s from its middle. This is without the warping that its clamps
-    forbid.
+    delta, also twists it: the torque is 4 delta (s/L)^3 per force, with s from its middle. The clamps, which forbid
+    warping, reduce this twist.
     """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism

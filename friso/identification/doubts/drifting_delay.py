@@ -16,7 +16,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the delays at the record's ends if a drift of the delay explains clearly more."""
+    """Name the delays at the record's ends if a drift explains more than a constant delay."""
     effect = case.led_by("drifting-delay")
     if effect is None:
         return

@@ -80,7 +80,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return the model's resonance [Hz] if it is nearer to the parasitic mode than to the joint.
+    """Return the model's resonance [Hz] if nearer to the parasitic mode than to the joint's.
 
     Returns None otherwise, and for a stage without a joint or a parasitic mode.
     """

@@ -71,7 +71,7 @@ def read_log(
 
 
 def _undecided(proposal: Proposal) -> list[str]:
-    """Return a line for each role for which several channels are possible, with an option."""
+    """Return a line for each role with several possible channels, and an option to choose one."""
     return [
         f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"

@@ -82,7 +82,7 @@ def explained_by(
 
 
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
-    """Tell whether the last of some additional forces is needed even if all parameters change.
+    """Tell whether a residual shows the last of some forces even if all parameters may change.
 
     `forces` [N], shape (n,) each, have size 1; `units` are the sizes at which they are simulated.
     """

@@ -14,7 +14,7 @@ from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
-    """Smooth the position of a log less and less, as long as the fit improves.
+    """Refit with the position of a log smoothed less and less, as long as the fit improves.
 
     Smoothing blurs the instants of break-away: for stick-slip motion without noise, a Stribeck exponent of 2 was fitted
     as 1.47 and the bristles a fifth too soft. Too little smoothing passes the noise of the position on to the force.

@@ -83,7 +83,7 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
-    """Return why parameters, or keys that follow from them, are not determined."""
+    """Return, by name, why parameters, or keys that follow from them, are not determined."""
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {

@@ -326,7 +326,10 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
 
 
 def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield each direction by name, with the mask of its samples."""
+    """Yield "forward" and "backward", each with the mask of the samples in this direction, (n,).
+
+    `directions`, shape (n,), are positive or negative numbers.
+    """
     yield "forward", directions > 0
     yield "backward", directions < 0
 

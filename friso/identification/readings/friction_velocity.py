@@ -280,8 +280,8 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
     """Make estimates for a direction from a Stribeck curve, with intervals for any exponent.
 
     Any exponent counts that the forces leave open. Static friction and Stribeck velocity are determined only if speeds
-    reach below the Stribeck velocity. No number is, except perhaps the exponent, if friction may still fall at the
-    highest speed.
+    reach below the Stribeck velocity. If friction may still fall at the highest speed, nothing is determined, except
+    perhaps the exponent.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:

@@ -106,7 +106,7 @@ ONE_WINDOW = "with one window (a diagnosis)"
 
 
 def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
-    """Return the errors on held-out samples, by the name of the set of samples."""
+    """Return the errors of both laws on sets of held-out samples, by the name of the set."""
     rows = [
         ("joint locked", guideline.locked.on_test),
         (f"of these {ONE_WINDOW}", guideline.held_out(False, _one_window)),

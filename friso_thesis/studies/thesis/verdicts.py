@@ -60,7 +60,7 @@ class ClaimVerdict:
 
     @property
     def robust(self) -> bool:
-        """Tell whether a claim fails for any plausible choice of what the thesis leaves open.
+        """Tell whether a claim fails for every plausible choice of what the thesis leaves open.
 
         The claim must hold in no draw of the open values, and at most in the fraction `ROBUST` by the 95 % interval. No
         assumption outside the draws may decide on it.

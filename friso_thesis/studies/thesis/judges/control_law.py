@@ -32,7 +32,7 @@ LAW_OF_RULES = K_P * (1 + TAU_Z / TAU_I + 1 / (TAU_I * S) + TAU_Z * S) / (TAU_P 
 def law_of_gains(gains: tuple[sp.Expr, sp.Expr, sp.Expr]) -> sp.Expr:
     """Return the transfer function of the PID controller of Eq. 6, from gains K_p, K_i and K_d.
 
-    Its derivative has the filter time constant of Eq. 7.
+    The derivative term is filtered with the time constant of Eq. 7.
     """
     proportional, integral, derivative = gains
     return proportional + integral / S + derivative * S / (S * TAU_P + 1)

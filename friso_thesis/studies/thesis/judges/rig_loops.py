@@ -1,4 +1,4 @@
-"""Add what the rig with its real drive shows, measured as in Fig. 17, 18, 22, 23."""
+"""Judge by the rig with its real drive, in claims on responses (Fig. 17, 18, 22, 23)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RAIL = "how friction varies along the rail, which rails these are, the drive's d
 
 
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
-    """Return what `parts` judges by the rig with its real drive; () if this rig was not run."""
+    """Return the criteria that `parts` judges by the rig with its real drive; () without it."""
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
 
 

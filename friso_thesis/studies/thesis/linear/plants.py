@@ -63,7 +63,7 @@ class LimitCase:
 
 @dataclass(frozen=True)
 class Springs:
-    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the plant at rest (`both`)."""
+    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the plant at 0 Hz (`both`)."""
 
     joint: float
     bristles: float
