@@ -317,9 +317,9 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
 def causes(case: RecordCase) -> list[RaisedDoubt]:
     """List findings on why a mass with friction does not describe a log.
 
-    Faults of the log come first; then effects with which the inverse model fits much better, best first, without those
-    that fit much worse than the best. Doubts of the moment "otherwise" are asked only if there is no such effect.
-    Returns [] if nothing explains the log.
+    Faults of the log come first. Effects follow with which the inverse model fits much better, best first, without
+    those that fit much worse than the best; then causes that no inverse model tests. Doubts of the moment "otherwise"
+    are examined only if no effect fits much better. Returns [] if nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))

@@ -61,7 +61,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
     """Return the changes during a record, from its smooth `velocity` [m/s], shape (n,).
 
-    The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes.
+    The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes,
+    and for a fit without Coulomb friction.
     """
     if "friction.coulomb" not in fit.problem.names:
         return None

@@ -36,8 +36,9 @@ OUT_OF_STEP = (
 def _claims(course: Course) -> str | None:
     """Return why a log holds moves, or None.
 
-    The reference of such a log moves, or it has no periodic excitation and no series of constant speeds or force ramps.
-    Without a reference its position rests in between, or its force has few frequencies, as with sines.
+    The reference of such a log moves. Otherwise it has no series of constant speeds or force ramps, and its driving
+    signal must meet one of two conditions. It does not repeat, and the log has no reference; or it repeats with rests
+    in between, or with few frequencies, as sines do.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
