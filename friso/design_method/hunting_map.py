@@ -29,7 +29,10 @@ class HuntingMap:
 
 
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
-    """Compute the map around a design, at its own drive stiffness."""
+    """Compute the map of corners not in position, over crossover and stroke, around a design.
+
+    The drive stiffness is the design's own.
+    """
     settings = DesignSettings.current()
     flat = stage.flat()
     crossovers, strokes = (

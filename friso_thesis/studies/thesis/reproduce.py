@@ -266,7 +266,7 @@ def _needs(
 
 
 def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tally: Tally) -> dict[float, xr.Dataset]:
-    """Return the map of Fig. 14B at the thesis's tolerance and a tight one."""
+    """Return the map of Fig. 14B at the thesis's tolerance and at a tight one, by tolerance."""
     maps = {}
     for study in studies.values():
         for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():

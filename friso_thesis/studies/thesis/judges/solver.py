@@ -59,7 +59,7 @@ CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(_cases())
 
 @judges("S323", figure="Sec. 3.2.3, solver")
 def solver_and_largest_step(evidence: Evidence) -> Finding:
-    """Compare runs by both solvers: whether they hunt, how often, and by how much."""
+    """Judge whether runs by the thesis's solver and by friso hunt alike, as often and as far."""
     kept = findings_on_file()[EVIDENCE].values
     return judged_runs({name: _kept(kept, name) for name in CASES}, own_runs(TIGHT), own_runs(RTOL))
 
