@@ -34,7 +34,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the force that a coupling would add, scaled to the inertia; none without a fitted mass."""
+    """Yield the force that a coupling would add, scaled to the inertia, if a mass is fitted."""
     fit, step, settings = case.fit, case.log.sample_time, DoubtSettings.current()
     if MASS not in fit.fitted:
         return
