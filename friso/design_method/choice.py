@@ -37,8 +37,8 @@ class Confirmed:
 class ChosenLeaves:
     """The leaf springs chosen, evaluated by the beam model, with their requirements.
 
-    `excess` is the factor by which they break each requirement by closed forms, at most 1. `passed_over` says why
-    softer ones were not taken.
+    `excess`, shape (requirements,), is the factor by which they use up each requirement by closed forms: 1 if they just
+    meet it, never more. `passed_over` says why softer leaf springs were not taken.
     """
 
     geometry: Geometry
@@ -100,7 +100,8 @@ def _in_order(
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Yield leaf springs in whole sizes that meet the requirements by closed forms.
 
-    The softest come first. Each geometry comes with the factor by which it uses up every requirement, at most 1.
+    The softest come first. Each geometry comes with the factor by which it uses up every requirement, shape
+    (requirements,), at most 1.
     """
     settings = DesignSettings.current()
     enough = task.spec.safety.parasitic * task.crossover

@@ -66,8 +66,8 @@ def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
 def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
     """Return the ranges of crossovers [Hz] in which the least modulus margin is at least 0.5.
 
-    They hold for the limit cases and all states stuck under a bias force, for the stage's own masses and all masses in
-    the population.
+    The margin counts in the limit cases and all states stuck under a bias force, for the stage's own masses and all
+    masses in the population.
     """
     flat = stage.flat()
     ranges = Modal.of(flat, leaves).comfortable
@@ -96,7 +96,7 @@ def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
 
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
-    """Return the joint dampings to try [N s/m]: the stage's own and larger ones."""
+    """Return the joint dampings to try [N s/m]: the stage's own, then larger ones, ascending."""
     critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
     given_damping = flat["joint.damping"]
     return np.array([given_damping, *(damping for damping in RATIOS * critical if damping > given_damping)])

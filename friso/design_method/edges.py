@@ -112,7 +112,7 @@ class OtherLaws:
 
 
 def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage with the friction keys of another law."""
+    """Return the stage's keys with all friction keys replaced by those of another law."""
     return {**{key: value for key, value in flat.items() if not key.startswith("friction.")}, **friction}
 
 
@@ -129,8 +129,5 @@ def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarra
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stage without isolator.
-
-    Cart and stage become one mass, as when fixtures lock the joint.
-    """
+    """Return the stage without isolator: cart and stage become one mass, as if locked."""
     return {key: value for key, value in flat.items() if not key.startswith(("joint.", "flexure.", "parasitic."))}

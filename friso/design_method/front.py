@@ -33,8 +33,8 @@ class Candidate:
 def front(task: LeafTask) -> list[Candidate]:
     """Return the Pareto front by rising stiffness (NSGA-II, doi:10.1109/4235.996017).
 
-    It is empty if no leaf springs meet the requirements. The requirement on the frequency of modes is left out, since
-    the search raises this frequency.
+    The list is empty if no leaf springs meet the requirements. The requirement on the frequency of modes is left out,
+    since the search raises this frequency.
     """
     settings = DesignSettings.current()
     from pymoo.algorithms.moo.nsga2 import NSGA2

@@ -26,7 +26,7 @@ class Sheet:
 
 
 def sheets(spec: Spec) -> list[Sheet]:
-    """Return all sheets that a specification allows."""
+    """Return all sheets that a specification allows: count, thickness and material combined."""
     section = spec.leaves
     return [
         Sheet(*sheet) for sheet in product(section.leaves, sorted(map(float, section.thickness)), section.materials)

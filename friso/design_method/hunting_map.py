@@ -1,4 +1,4 @@
-"""Map over crossover and stroke where moves come to rest, in the corners of a specification."""
+"""Map, over crossover and stroke, how many corners of a specification do not come to rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from friso.stage import Stage
 
 @dataclass(frozen=True)
 class HuntingMap:
-    """In which fraction of corners the stage is not in position, over crossover and stroke.
+    """The fraction of corners in which the stage is not in position, over crossover and stroke.
 
     Corners are the extremes of friction and masses. Crossovers [Hz] have shape (n,), strokes [m] (m,), and fractions
     (m, n). A corner counts if the stage is not in position a quarter of a minute after a typical move. The fraction is
@@ -29,7 +29,10 @@ class HuntingMap:
 
 
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
-    """Compute the map around a design, at its own drive stiffness."""
+    """Compute the map of corners not in position, over crossover and stroke, around a design.
+
+    The drive stiffness is the design's own.
+    """
     settings = DesignSettings.current()
     flat = stage.flat()
     crossovers, strokes = (

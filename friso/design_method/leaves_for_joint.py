@@ -140,8 +140,8 @@ class _Search:
     def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
         """Return leaf springs in whole sizes next to `best`, (3,), with the stiffness required.
 
-        They break no requirement. First comes the one with the highest frequency of a mode that interferes with
-        control.
+        Only leaf springs that break no requirement are returned. First come those whose lowest mode that interferes
+        with control has the highest frequency.
         """
         settings = DesignSettings.current()
         sheet = self.bought[int(best[2])]

@@ -86,8 +86,8 @@ class NoDesign(Exception):
 class LeavesAndCrossover:
     """Leaf springs and a crossover that fit each other.
 
-    It holds the task for which the leaves were chosen, the choice, and the stage with both. `comfortable` are the
-    ranges of crossovers [Hz] with a modulus margin of at least 0.5.
+    Fields are the task for which the leaves were chosen, the choice, and the stage with leaves and crossover.
+    `comfortable` are the ranges of crossovers [Hz] with a modulus margin of at least 0.5.
     """
 
     task: LeafTask
@@ -200,7 +200,7 @@ class DesignInterrupted(KeyboardInterrupt):
 class NotNeeded(Exception):
     """Raised by a design if the machine needs no isolator and none is wanted anyway.
 
-    It holds the design `so_far`.
+    `so_far` is the design up to then.
     """
 
     def __init__(self, so_far: UnfinishedDesign) -> None:
@@ -302,8 +302,9 @@ def _by_law(
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """Return the joint damping with which margins no longer limit the crossover.
 
-    The second result is the crossover [Hz] that is then possible. The damping is None if the crossover is that high
-    already, or if no damping tried helps.
+    The second result is the crossover [Hz] that is then possible. The damping is None if the crossover is nearly that
+    high already, or if no damping tried helps. The second result is then the highest crossover that specification and
+    leaf springs allow.
     """
     settings = DesignSettings.current()
     flat, spec = fit.stage.flat(), fit.task.spec

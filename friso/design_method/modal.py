@@ -80,7 +80,7 @@ class Modal:
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
-    """Count how often curves `ratio`, (..., frequencies), run around the origin."""
+    """Return how often curves `ratio` in the complex plane, (..., frequencies), run around 0."""
     return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
 
 

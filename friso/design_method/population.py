@@ -31,7 +31,7 @@ class Population:
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:
-        """Return the keys of one machine that differ from the stage."""
+        """Return the values [SI] of one machine, by its number, for keys that differ from the stage."""
         return {key: float(values[number]) for key, values in self.keys.items()}
 
 

@@ -57,10 +57,10 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
 
 def offset_points(stage: Stage, spec: Spec) -> dict[str, str]:
-    """Return the key of the offset of actuator and sensor from mid-width.
+    """Return the key for the specified offset of actuator and sensor from mid-width.
 
-    The result is empty if the stage states an offset. Without one, neither would see a mode in which the stage turns
-    about the leaves, which no real machine achieves.
+    The result is empty if the stage states a place of actuator or sensor, or the specification no offset. Without an
+    offset, neither would see a mode in which the stage turns about the leaves, which no real machine achieves.
     """
     points = {f"flexure.{point}_{axis}" for point in ("actuation", "sensor") for axis in "xyz"}
     if points & stage.flat().keys() or not spec.leaves.offset:

@@ -53,7 +53,7 @@ def _change(relaxation: Relaxation) -> float:
 
 
 def _space(task: LeafTask) -> list[Requirement]:
-    """Return the limits of space and sheets as requirements."""
+    """Return the limits of the leaves' sizes and of the sheets' thickness as requirements."""
     low, high = box(task.spec)
     gauges = sorted(map(float, task.spec.leaves.thickness))
     limits = []
@@ -91,7 +91,7 @@ class _Trials:
 
     @property
     def kinds(self) -> list[tuple[float, str]]:
-        """Return the combinations of number of leaves and material."""
+        """Return the allowed combinations of number of leaves and material."""
         section = self.task.spec.leaves
         return [(count, material) for count in section.leaves for material in section.materials]
 

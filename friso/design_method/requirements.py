@@ -22,7 +22,7 @@ from friso.leaf_springs.mechanism import GRAVITY, Mechanism
 class LeafTask:
     """The task that leaf springs are designed for.
 
-    It holds the specification, a stroke [m], the crossover [Hz], the least static friction [N], and the stage's flat
+    Fields are the specification, a stroke [m], the crossover [Hz], the least static friction [N], and the stage's flat
     keys without leaves. The first mode that interferes with control must lie above a multiple of the crossover.
     """
 
@@ -46,10 +46,10 @@ class LeafTask:
 
 @dataclass(frozen=True)
 class RelaxableKey:
-    """A key of the specification that relaxes a requirement.
+    """A key of the specification that relaxes a requirement if it is changed.
 
-    It holds the `key`, its `value` and `unit`. `needed` computes the value needed from the factor by which leaf springs
-    break the requirement; None if no change of the key is enough.
+    Fields are the `key`, its `value` and `unit`. `needed` is a function from the factor by which leaf springs break the
+    requirement to the value needed; None if no change of the key is enough.
     """
 
     key: str
@@ -160,7 +160,10 @@ def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
 
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:
-    """Return the requirements on support stiffness at full stroke."""
+    """Return the requirements on stiffness along and across the leaves at full stroke.
+
+    The list is empty if the specification has none.
+    """
     forms = {
         "support_x": ("along the leaves", closed_forms.support_x),
         "support_y": ("across them", closed_forms.support_y),
@@ -179,15 +182,15 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
 def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
     """Return the load on the leaves relative to the load at which they buckle.
 
-    It adds two parts. One is the largest force along a leaf, times the number of leaves, over the `buckling` load [N].
-    The other is the force across the leaves over the force at which they buckle sideways.
+    The ratio is a sum of two. One is the largest force along a leaf, times the number of leaves, over the `buckling`
+    load [N]. The other is the force across the leaves over the force at which they buckle sideways.
     """
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
 
 
 def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
-    """Return the largest force along a leaf [N]: its share of the load, plus a moment's part.
+    """Return the largest force along a leaf [N]: its share of the load, plus a part by a moment.
 
     The moment acts about the width of the leaves.
     """

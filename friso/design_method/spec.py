@@ -120,7 +120,7 @@ FORMER_LIMIT = "bandwidth_limit"
 
 
 class SpecMachine(Section):
-    """How fast the controller may be, or the parasitic frequencies that decide it."""
+    """How fast the controller may be: a crossover limit, or parasitic frequencies that set it."""
 
     crossover_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
     parasitic_frequencies: Annotated[

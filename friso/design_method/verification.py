@@ -88,7 +88,7 @@ class MachineOutcomes:
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
 
     def followed(self, number: int) -> float:
-        """Return for how long [s] a machine was followed after its move."""
+        """Return for how long [s] the machine with this number was simulated after its move."""
         settings = DesignSettings.current()
         soon = self.settling[number] <= (1 - settings.last_share) * settings.followed_time
         return settings.followed_time if soon else settings.longer_factor * settings.followed_time

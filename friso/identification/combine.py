@@ -50,12 +50,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
 
 
 def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the keys of all groups of estimates, and the correlations of their combined values.
-
-    `estimates` come from all experiments. A group holds the estimates of one experiment that have a value, and their
-    correlations. The result has the shape (keys, keys). A combined value is a weighted mean of independent experiments.
-    So the covariance is the sum of A_i C_i A_i, with weights A_i (diagonal) and the covariance C_i within experiment i.
-    """
+    """Return the keys of all groups, and the correlations (keys, keys) of their combined values."""
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
         key: sum(_weight(estimate) for estimate in determined(estimates) if estimate.name == key) for key in keys
@@ -73,7 +68,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
 
 
 def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """List the estimates that have a value; by their intervals they can be weighted."""
+    """List the estimates that have a value; their intervals give them weights in a mean."""
     return [estimate for estimate in estimates if estimate.determined]
 
 
@@ -85,10 +80,12 @@ def _weight(estimate: Estimate) -> float:
 def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """Return the weighted mean of one key's estimates, and whether they agree (chi-square).
 
-    If they scatter more than their own intervals allow, the interval is wider by the Birge ratio (Birge 1932,
-    doi:10.1103/PhysRev.40.207), and for three or more by Student's t. Systematic parts do not average out. If the
-    estimates do not agree, as friction at several places, each gets an additional scatter (`_between`); for two, which
-    hardly show a scatter, the interval spans both.
+    If agreeing estimates scatter more than their intervals allow, the interval is widened by the Birge ratio (Birge
+    1932, doi:10.1103/PhysRev.40.207). For three or more it then follows Student's t. Systematic parts of the intervals
+    do not average out.
+
+    Estimates disagree, for example, if friction was measured at several places. A scatter common to all is then added
+    (`_between`). Two estimates hardly show a scatter, so the interval then spans both.
     """
     values, weights = (
         np.array(column)
@@ -112,10 +109,11 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 
 
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
-    """Return the mean, with its deviation, of values (n,) that scatter beyond their variances.
+    """Return the mean, with its error, of values (n,) that scatter beyond their variances.
 
     A common variance is added, just large enough to explain the scatter (Paule, Mandel 1982, doi:10.6028/jres.087.022).
-    The degrees of freedom count effectively equal weights, because an uncertain value says little about the scatter.
+    The degrees of freedom are the effective number of values less 1, because an uncertain value says little about the
+    scatter.
     """
 
     def excess(added: float) -> float:
@@ -154,7 +152,7 @@ def _reasons(reasons: Sequence[str]) -> str:
 
 
 def _text(estimate: Estimate) -> str:
-    """Return an estimate in words, with its method."""
+    """Return an estimate in words: its value with interval, or its range, and its method."""
     return f"{_value(estimate)} by {estimate.method}"
 
 
@@ -166,7 +164,7 @@ def _texts(estimates: Sequence[Estimate]) -> str:
 
 
 def _value(estimate: Estimate) -> str:
-    """Return the value with its interval in words, or the remaining range."""
+    """Return an estimate's value with its interval in words, or its range without a value."""
     if estimate.determined:
         return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g})"
     return f"{estimate.low:.4g} to {estimate.high:.4g} is the possible range"

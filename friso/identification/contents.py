@@ -73,8 +73,8 @@ class LogContent:
     """Contents of a log file, before anything is identified.
 
     Fields are the title of the file's format, its channels or frequency response, and the kind of experiment with the
-    reason ("" if open). `read` has lines on how the file was read, `gaps` what the user must state before
-    identification, and `options` the options used for reading.
+    reason for it ("" if open). `read` has lines on how the file was read. `gaps` lists what the user must state before
+    identification, and `options` has the options used for reading.
     """
 
     path: Path
@@ -90,7 +90,7 @@ class LogContent:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Return the lines of `read` about lost parts of the file."""
+        """Return the lines of `read` that tell of parts of the file left out or missing."""
         return tuple(line for line in self.read if line.startswith("left out") or " ends early: " in line)
 
 

@@ -78,8 +78,8 @@ class RecordCase:
 class ValueCase(RecordCase):
     """A log of moves whose inverse model is checked for implausible values.
 
-    `lacks` is true if the whole model leaves clearly more than noise, `poor` if the inverse model does not describe the
-    log.
+    `lacks` is true if the residual of the whole model is clearly above the noise; `poor` is true if the inverse model
+    does not describe the log.
     """
 
     lacks: bool = False
@@ -90,10 +90,9 @@ class ValueCase(RecordCase):
 class TriedForces:
     """Forces, shape (n,) each, by which an effect outside the model may explain a residual.
 
-    A force [N] is given for an effect of size 1, and simulated at the small size in `units`. `label` distinguishes
-    hypotheses of one effect, such as the width of a play [m]. `searched` is the number of hypotheses from which this
-    one is chosen, because the best of many explains more by chance. Unless the largest fitted size is at least `least`,
-    another effect is the cause.
+    A force [N] belongs to an effect of size 1, and is simulated at the small size in `units`. `label` is a number of
+    the effect, such as the width of a play [m]. If several numbers were tried for the same forces, `searched` says how
+    many: the best of many explains more by chance. If no fitted size reaches `least`, another effect is the cause.
     """
 
     forces: Sequence[np.ndarray]
@@ -129,13 +128,13 @@ class FitCase(FittedCase):
 
     @property
     def refused(self) -> dict[str, str]:
-        """Return why keys are not reported, by key; the first of several reasons counts."""
+        """Return why keys of the stage file are not reported, by key: the first reason given."""
         last_first = reversed(self.quality.findings)
         return {key: why for finding in last_first for key, why in finding.refuses.items()}
 
     @property
     def has_cause(self) -> bool:
-        """Tell whether a cause of the residual is already named, which may imitate other causes."""
+        """Tell whether a cause of the residual was named already, which may imitate others."""
         explaining = any(finding.explains for finding in self.quality.findings)
         return explaining or self.quality.spoilt or bool(self.quality.without)
 
@@ -148,7 +147,7 @@ class FitCase(FittedCase):
 
     @property
     def describes(self) -> bool:
-        """Tell whether the fit describes the log at all."""
+        """Tell whether the fit describes the log: it neither failed nor was rejected."""
         return not (self.quality.failed or self.quality.rejected)
 
     def led_by(self, doubt: str) -> LeadingEffect | None:
@@ -161,9 +160,9 @@ class FitCase(FittedCase):
     def explained(
         self, forces: Callable[[FittedCase], Iterable[TriedForces]]
     ) -> Iterator[tuple[TriedForces, ExplainedResidual]]:
-        """Yield each force of an effect that explains a part of the fit's residual, with that part.
+        """Yield an effect's forces that explain part of the fit's residual, with what they explain.
 
-        Nothing is yielded if the fit does not describe the log.
+        `forces` returns the forces to try. Nothing is yielded if the fit does not describe the log.
         """
         for tried in forces(self) if self.describes else ():
             explained = explained_by_forces(self.fit, tried.forces, tried.units)
@@ -184,9 +183,9 @@ class FitCase(FittedCase):
     ) -> RaisedDoubt:
         """Return a finding that names an effect as the cause of the residual.
 
-        The finding widens intervals by the effect's shift, and withholds the bristles, which the effect can imitate.
-        `words` name the effect, and `size` is in `unit`. `further` widens the intervals of some parameters more, by
-        name.
+        The finding widens intervals by the shift that the effect causes. It withholds the estimates of the bristles,
+        which the effect can imitate. `words` name the effect, and `size` is in `unit`. `further` widens the intervals
+        of some parameters more, by name.
         """
         refuses: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED)
         wider = self.reaching(effect.explained.moved, further)
@@ -206,7 +205,7 @@ class FitCase(FittedCase):
         return RaisedDoubt(fit=finding.fit) if small else finding
 
     def with_finding(self, finding: RaisedDoubt) -> FitCase:
-        """Return the case with a finding and its consequences for the fit."""
+        """Return the case with a finding added, and its consequences for the fit applied."""
         quality = replace(
             self.quality, findings=(*self.quality.findings, finding), spoilt=self.quality.spoilt or finding.spoils
         )
@@ -252,11 +251,13 @@ class KeyCase(FitCase):
 class RaisedDoubt:
     """What a doubt found in a log: the cause in `words`, its `size` in `unit`, and what follows.
 
-    `words` are "" if estimates state the cause. Intervals are extended to the values of the inverse model `without` the
-    effect, and to `reaches`, by quantity of the inverse model. `fit` and `inverse` have intervals that allow for the
-    effect. `answers` replace estimates of the same key. `refuses` gives the reason for each key that is not reported.
-    An effect that `spoils` the record can be mistaken for friction at low speed. If an effect `explains` the residual,
-    no other explanation is named. `doubt` is the doubt's name.
+    `words` are "" if estimates state the cause themselves. `without` is the inverse model corrected for the effect;
+    intervals are extended to its values. `reaches` has further ranges to cover, by quantity of the inverse model. `fit`
+    and `inverse` are the fits with intervals that allow for the effect. `answers` replace estimates of the same key,
+    and `refuses` has the reason for each key that is not reported.
+
+    If `spoils` is true, the effect can be mistaken for friction at low speed. If `explains` is true, no other
+    explanation of the residual is named. `doubt` is the doubt's name.
     """
 
     words: str = ""
@@ -316,9 +317,9 @@ def words_of(moment: Moment, case: Any) -> tuple[str, ...]:
 def causes(case: RecordCase) -> list[RaisedDoubt]:
     """List findings on why a mass with friction does not describe a log.
 
-    Faults of the log come first; then effects with which the inverse model fits much better, best first, without those
-    that fit much worse than the best. Doubts of the moment "otherwise" are asked only if there is no such effect.
-    Returns [] if nothing explains the log.
+    Faults of the log come first. Effects follow with which the inverse model fits much better, best first, without
+    those that fit much worse than the best; then causes that no inverse model tests. Doubts of the moment "otherwise"
+    are examined only if no effect fits much better. Returns [] if nothing explains the log.
     """
     settings = DoubtSettings.current()
     every = list(raised("cause", case))
@@ -380,10 +381,10 @@ def judged_keys(case: KeyCase) -> KeyCase:
 
 
 def refused(estimates: Iterable[Estimate], reasons: Mapping[str, str]) -> dict[str, Estimate]:
-    """Return the estimates that are withheld, by key, with the reason in place of the value.
+    """Return the withheld estimates by key, each with its reason in place of the value.
 
-    `reasons` are by key; a key without a reason is not withheld. The range left to Coulomb friction reaches down to its
-    lower end divided by the highest ratio of static to Coulomb friction.
+    `reasons` are by key; an estimate without a reason is left out. The range left to Coulomb friction reaches down to
+    its lower end divided by the highest ratio of static to Coulomb friction.
     """
     ratio = OutputErrorSettings.current().highest_friction_ratio
     return {
@@ -405,5 +406,5 @@ def _at(moment: Moment) -> list[str]:
 
 
 def _named(name: str, case: Any) -> Iterator[RaisedDoubt]:
-    """Yield the findings of the doubt `name`, marked with its name."""
+    """Yield the findings of the doubt `name`, each with this name in its field `doubt`."""
     return (replace(finding, doubt=name) for finding in DOUBTS[name].find(case))

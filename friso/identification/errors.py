@@ -67,17 +67,20 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
 
 
 def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
-    """Return the size of the force that guides a stage along a log, over the logged force.
+    """Return the force that guides a stage along a log, relative to the logged force.
 
-    `held` contains this force, which the model leaves unexplained; `part` are the samples. It stands as the error of
-    the force; errors of the motion are NaN.
+    `held` is the simulated record with this force, which the model leaves unexplained; `part` are the samples. The
+    result stands as the error of the force; errors of the motion are NaN.
     """
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
     return SimulationErrors(np.nan, np.nan, np.nan, share)
 
 
 def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
-    """Describe the residual force [N], (n,), over a motion sampled every `sample_time` [s]."""
+    """Describe the residual force [N], (n,), of a fit sampled every `sample_time` [s].
+
+    `moved` is the filtered motion of these samples.
+    """
     alike = correlation_length(residual)
     return Residual(
         float(np.sqrt(np.mean(residual**2))),
@@ -89,14 +92,14 @@ def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float)
 
 
 def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
-    """Return the norm of a difference over the norm of the measured signal."""
+    """Return the norm of measured minus simulated values over the norm of the measured ones."""
     return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
 
 
 def _explained(residual: np.ndarray, along: np.ndarray) -> float:
     """Return the fraction of a residual's power that its means over bins of `along` explain.
 
-    The part that chance explains is subtracted.
+    `along`, shape (n,), is a position or a speed. The fraction that chance explains is subtracted.
     """
     settings = IdentificationSettings.current()
     edges = np.linspace(along.min(), along.max(), settings.bins_of_a_residual + 1)

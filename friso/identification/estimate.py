@@ -40,7 +40,10 @@ class Estimate:
 
     @classmethod
     def normal(cls, name: str, unit: str, value: float, deviation: float, method: str) -> Estimate:
-        """Make an estimate with the interval of a normal distribution of this standard deviation."""
+        """Make an estimate whose 95 % interval is that of a normal distribution.
+
+        `deviation` is its standard deviation, in the `unit` of the `value`. `name` and `method` are stored.
+        """
         half = COVERAGE * deviation
         return cls(name, unit, float(value), float(value - half), float(value + half), method)
 
@@ -48,7 +51,11 @@ class Estimate:
     def unknown(
         cls, name: str, unit: str, method: str, reason: str, low: float = -np.inf, high: float = np.inf
     ) -> Estimate:
-        """Make an estimate that the data do not determine, with the reason and remaining bounds."""
+        """Make an estimate that the data do not determine, with the reason.
+
+        `low` and `high`, in its `unit`, bound the remaining range (default: nothing is known). `name` and `method` are
+        stored.
+        """
         return cls(name, unit, np.nan, float(low), float(high), method, reason)
 
     @property

@@ -35,7 +35,7 @@ NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 class InverseModel:
     """A fit of force = M a + F_v v + F_c sign(v) + offset to a log, with its data.
 
-    `estimates` have intervals; `solution` has the plain coefficients by name ("mass"; per direction "... forward" and
+    `estimates` have intervals; `solution` has the fitted coefficients by name ("mass"; per direction "... forward" and
     "... backward"). The fit combines the `columns`, shape (rows, columns); `covariance` is that of their coefficients.
     `time` [s] and forces [N], `measured` and `fitted`, have the shape (rows,). `bandwidth` [Hz] is the motion's.
     """
@@ -253,7 +253,7 @@ def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Mark the rows that belong to a long stretch of slow motion, shape (rows,).
+    """Mark the rows (rows,) in stretches of slow motion that last long enough to be left out.
 
     `slow` marks slow rows, and `time` [s] has their instants.
     """
@@ -324,5 +324,5 @@ def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
 
 
 def _first(count: int, step: int) -> int:
-    """Return the first row to keep when thinning rows, so that the last row is kept too."""
+    """Return the first row to keep so that, at every `step`th of `count`, the last one is kept."""
     return (count - 1) % step

@@ -15,10 +15,7 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identification.experiment
 
 
 def in_order(registry: Registry[Any] = KINDS) -> list[str]:
-    """Return the names in a registry, each after all kinds that its `after` names.
-
-    Otherwise they stand in alphabetical order.
-    """
+    """Return the names in a registry, each after all names in its `after`, else alphabetically."""
     sorter = TopologicalSorter(
         {name: [other for other in registry[name].after if other in registry] for name in registry}
     )

@@ -120,8 +120,8 @@ def with_laws(
 ) -> Identification:
     """Return an identification with the friction laws that its logs support.
 
-    Fits start from `base` if its law allows that. Raises InputError if no log shows friction before sliding, and for a
-    law without stiction.
+    Laws are fitted from the friction of `base`, or of the identified stage where the law of `base` does not allow that.
+    Raises InputError if no log shows friction before sliding, and for a law without stiction.
     """
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
@@ -206,7 +206,7 @@ def _unpredictable(log: Log) -> InputError:
 
 
 def _doubts(experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """List the doubts about the results, grouped by logs if there are several experiments."""
+    """List the doubts about the results in sentences; with several experiments, by their logs."""
     doubts_by_log = [KINDS[experiment.kind].doubts(experiment.result) for experiment in experiments]
     if len(experiments) == 1:
         return tuple(doubts_by_log[0])
@@ -248,7 +248,7 @@ def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
 
 
 def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
-    """List notes on the results for the engineer, by kind."""
+    """List notes of the kinds of experiment on their results, for the engineer."""
     results: dict[str, list[Any]] = {}
     for experiment in experiments:
         results.setdefault(experiment.kind, []).append(experiment.result)
@@ -260,7 +260,8 @@ def _correlations(
 ) -> Correlations:
     """Return the correlations between uncertain keys of the identified stage.
 
-    A key that follows another one has the other's correlations. Keys that are correlated with no other are left out.
+    A key whose value follows that of another key has the other key's correlations. Keys that are correlated with no
+    other are left out.
     """
     keys, matrix = correlations(
         _every_estimate(experiments),

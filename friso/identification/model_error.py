@@ -50,7 +50,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
 
 
 def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
-    """Map stage-file keys to quantities of the inverse model, with the conversion factor."""
+    """Return quantity of the inverse model, and factor from it to the key, by stage-file key."""
     bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
     total = sum(flat[key] for key in bodies)
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
@@ -66,7 +66,10 @@ def inverse_sources(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
-    """Return estimates and correlation from the inverse model; other keys have no value."""
+    """Return estimates of the keys by the inverse model, and their correlation (the identity).
+
+    Keys that the inverse model does not show have no value. The correlation covers the keys with a value.
+    """
     sources, answers = inverse_sources(flat), []
     for estimate in estimates:
         name, scale = sources.get(estimate.name, ("", 1.0))
@@ -87,9 +90,12 @@ def with_model_error(
     """Return an estimate of the whole model whose interval includes the model error.
 
     The interval is extended by the distance of its value from the inverse model's interval, times `lacking`, the
-    fraction of the residual that is not noise. It is no narrower than the inverse model's interval times `lacking` and
-    `alike`, which is 1 if both models have equal residuals, because shared errors move both. `scale` is the factor from
-    the inverse model's quantity to the key. An estimate without a value is returned unchanged.
+    fraction of the residual that is not noise. It is at least as wide as the inverse model's interval times `lacking`
+    and `alike`. `alike` is the ratio of the two models' residuals, at most 1: with equal residuals, shared errors may
+    move both.
+
+    `scale` is the factor from the inverse model's quantity to the key. An estimate is returned unchanged if either
+    model has no value.
     """
     if not (estimate.determined and inverse.determined):
         return estimate
@@ -100,7 +106,7 @@ def with_model_error(
 
 
 def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
-    """Return estimates of a rigid stage with intervals that include the model error.
+    """Return estimates of a rigid stage, by key, with intervals that include the model error.
 
     For moves in one direction the model leaves out the constant force, so no interval is narrower than that of the
     inverse model. Quantities that the inverse model does not have get wider intervals if the fit lacks something.
@@ -120,9 +126,10 @@ def _with_model_error(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _with_causes(case: KeyCase) -> dict[str, Estimate]:
-    """Return estimates by key, extended to the values of the log corrected for each cause.
+    """Return estimates by key, whose intervals also cover the values without the fault's causes.
 
-    The result is empty unless the record has a fault.
+    For each cause of the fault, the inverse model of the log corrected for it gives these values. The result is empty
+    unless the record has a fault.
     """
     if not case.quality.spoilt:
         return {}
@@ -137,13 +144,13 @@ def _with_causes(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _imitated_by_causes(case: KeyCase) -> dict[str, str]:
-    """Return, by key, why a faulty record does not show keys outside the inverse model."""
+    """Return, by key, why a faulty record does not show keys that the inverse model lacks."""
     others = case.determined.keys() - inverse_sources(case.flat).keys() if case.quality.spoilt else ()
     return dict.fromkeys(others, SPOILT)
 
 
 def _reaching(case: KeyCase) -> dict[str, Estimate]:
-    """Extend intervals to the values that findings state for the inverse model's quantities."""
+    """Return estimates by key, extended to the ranges that findings state for the inverse model."""
     answers = {}
     for finding in case.quality.findings:
         for key, (name, scale) in inverse_sources(case.flat).items():
@@ -155,26 +162,26 @@ def _reaching(case: KeyCase) -> dict[str, Estimate]:
 
 
 def _wider(estimate: Estimate, much: bool) -> Estimate:
-    """Return an estimate with a wider interval if `much` is left unexplained."""
+    """Return an estimate, its interval widened by a set factor if `much` is left unexplained."""
     more = (DoubtSettings.current().widening_where_much_is_left - 1) * estimate.half_width if much else 0.0
     return replace(estimate, low=estimate.low - more, high=estimate.high + more)
 
 
 def _rid_of(model: InverseModel, inverse: InverseModel, name: str) -> tuple[Estimate, float]:
-    """Return a quantity of `model`, corrected for a cause, and its remaining error.
+    """Return a quantity of `model`, corrected for a cause, and how far it may still be off.
 
-    `inverse` is the model before the correction. The correction may be incomplete; as much again may be missing at
-    most.
+    `inverse` is the model before the correction. The correction may be incomplete: at most, as much as it changed may
+    be missing again. The second result has a sign.
     """
     share = min(model.error / max(inverse.error - model.error, 1e-12), 1.0)
     return model.estimate(name), share * (model.value(name) - inverse.value(name))
 
 
 def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) -> Estimate:
-    """Return an estimate whose interval also covers another one, times `scale`.
+    """Return an estimate whose interval also covers another estimate times `scale`.
 
-    Both estimates count, because it is undecided which is right. The other's interval is extended by `further`, in its
-    unit.
+    Both count, because it is undecided which is right. Before the scaling, the other's interval is extended by
+    `further`, in its own unit.
     """
     if not (estimate.determined and other.determined):
         return estimate

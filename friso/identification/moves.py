@@ -190,9 +190,10 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """Set up the stage and parameters of a fit on another log, with that log's own [setup].
+    """Set up the fit of a closed loop to another log, with that log's own [setup].
 
-    `set_up` has the stage for that log as flat keys; its controller and the `changed` keys are used.
+    `set_up` has the stage for that log as flat keys; its controller and the `changed` keys are used. Raises InputError
+    for a missing role.
     """
     check_roles(log, ("position", "force", "reference"))
     flat = dict(problem.flat)

@@ -126,9 +126,9 @@ def quality_of(
 def _verdict(
     plain: Quality, reasons: list[RaisedDoubt], unit: str, poor: bool, rejected: bool, frictionless: bool
 ) -> str:
-    """Write how much the fit leaves unexplained, and why; "" for a complete model.
+    """Write how much the fit leaves unexplained, and why; "" if nothing is missing in the model.
 
-    `reasons` are findings that explain it. The inverse model may be `poor`, or the whole model `rejected`;
+    `reasons` are findings that explain what is left. The inverse model may be `poor`, or the whole model `rejected`;
     `frictionless` is true if the stage file says that there is no friction.
     """
     why = "".join(f"; {cause.words}" for cause in reasons)

@@ -80,7 +80,7 @@ class Recorded(Motion):
 
     @staticmethod
     def with_defaults(flat: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the record's duration as the default of `duration`."""
+        """Return the record's duration as default of `duration`; {} if a duration is stated."""
         return {} if DURATION in flat else {DURATION: _samples(flat)[0][-1]}
 
 

@@ -100,7 +100,7 @@ def read_usable(
 
 
 def _mentioning_kept(error: InputError, path: Path, options: Mapping, folder: Path) -> LogError:
-    """Add to an error about a log that its stored mapping may be the cause."""
+    """Return an error about a log with the hint that its stored mapping may be the cause."""
     try:
         kept = "" if is_frequency_response(path) else (load_mapping(path, folder) or Mapping()).beside(options).words
     except InputError:
@@ -146,8 +146,8 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
 def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     """Keep a force in its logged unit, such as volts, for kinds analysed per unit of force.
 
-    `beside` is the axis of a given stage file, or None. Raises InputError with a stage file, whose numbers are in
-    newtons.
+    `beside` is the axis of a given stage file, or None. Files of other kinds, or with a force in newtons, are returned
+    unchanged. Raises InputError for a force in another unit beside a stage file, whose numbers are in newtons.
     """
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
@@ -254,7 +254,7 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
 
 
 def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
-    """Read a log with the signals that a kind of experiment needs."""
+    """Read a log with the signals that a kind of experiment needs, in the units that it needs."""
     chosen = KINDS[kind]
     return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
 

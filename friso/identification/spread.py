@@ -98,8 +98,9 @@ def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
 def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Return the covariance of the sum of scores, (n, p), that are correlated within groups.
 
-    Scores are the columns of the fit times the residual. The covariance is scaled for normal intervals of `COVERAGE`
-    deviations. The degrees of freedom count effectively equal groups.
+    `group`, shape (n,), has the number of each row's group. Scores are the columns of the fit times the residual. The
+    covariance is scaled so that normal intervals of `COVERAGE` deviations hold. The degrees of freedom are the
+    effective number of equal groups less 1.
     """
     names, members = np.unique(group, return_inverse=True)
     sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)

@@ -93,7 +93,7 @@ TOLD_BY_LOGS = ("masses", "friction", "motion")
 
 
 def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
-    """Return the tables of a stage file, with missing ones taken from a made-up stage."""
+    """Return the tables of a stage file, completed by those of a made-up stage that it lacks."""
     made = around.as_written()
     return {**{name: made[name] for name in TOLD_BY_LOGS}, **tables}
 

@@ -70,10 +70,10 @@ def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
 
 
 def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
-    """Narrow an estimate without a value to the range that was known beforehand.
+    """Narrow an estimate without a value to the range that the stage file states.
 
     If static friction has only a lower bound, above the stage's value and Coulomb friction, the highest plausible ratio
-    to Coulomb friction bounds it from above.
+    to Coulomb friction bounds it from above. Coulomb friction is taken from the `estimates`, or else from the stage.
     """
     before = stage.uncertain().get(estimate.name)
     if before is not None and not estimate.determined and before.high >= estimate.low and before.low <= estimate.high:
@@ -89,9 +89,9 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
 
 
 def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
-    """Restrict an estimate to the limits of its key, or return None if that is impossible.
+    """Restrict an estimate to the limits of its key; return it, or None if that is impossible.
 
-    The second result is the reason for a change, or "". Estimates without finite ends give None, too.
+    The second result is the reason for a change, or "". The estimate must have finite ends.
     """
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
@@ -113,7 +113,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:
-    """List the finite ends of an estimate, each named "at least" or "at most"."""
+    """List the finite ends of an estimate's interval, each as ("at least" or "at most", value)."""
     return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
 
 

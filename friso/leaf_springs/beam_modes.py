@@ -169,9 +169,9 @@ def end_motions(offsets: np.ndarray) -> np.ndarray:
 
 
 def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Sum a matrix (6, 6) at the stage end of each leaf to the matrix that acts on the stage.
+    """Add up a matrix (6, 6) at each leaf's stage end to the matrix that acts on the stage.
 
-    `ends` (leaves, 6, 6) tells how the stage ends follow the stage.
+    `ends` (leaves, 6, 6) tells how the stage ends of the leaves follow the stage.
     """
     return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
 

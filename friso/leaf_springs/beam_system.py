@@ -101,7 +101,7 @@ class Configuration:
 
     @classmethod
     def rest(cls, leaves: LeafBeams) -> Configuration:
-        """Return the configuration without deflection."""
+        """Return the configuration in which leaves and stage are not displaced."""
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
     def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:

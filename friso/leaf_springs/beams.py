@@ -65,7 +65,7 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
 
 
 def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
-    """Evaluate the mechanism from its straight state to the stroke [m], and collect the results."""
+    """Evaluate the mechanism at several deflections up to the stroke [m], and its modes at rest."""
     settings = LeafSpringSettings.current()
     deflections = np.linspace(0, stroke, settings.beam_deflections)
     rest = Configuration.rest(leaves)

@@ -47,12 +47,12 @@ def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
 
 
 def axial(mechanism: Mechanism) -> Any:
-    """Return E A of a leaf [N], including the stiffening by its clamps."""
+    """Return E A of a leaf [N], its stiffness against stretching, stiffened by its clamps."""
     return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
 
 
 def edgewise_shear(mechanism: Mechanism) -> Any:
-    """Return 5/6 G A of a leaf in its plane [N], including the stiffening by its clamps."""
+    """Return the shear stiffness of a leaf in its plane, 5/6 G A [N], stiffened by its clamps."""
     return (
         SHEAR
         * mechanism.shear
@@ -76,8 +76,8 @@ def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
     """Return the stiffness along the width [N/m] while all other coordinates are held.
 
     The stiffness contains bending and shear in the plane of the leaves. A force across a leaf under a `deflection` [m],
-    delta, also twists it by 4 delta (s/L)^3, with s from its middle. This is without the warping that its clamps
-    forbid.
+    delta, also twists it: the torque is 4 delta (s/L)^3 per force, with s from its middle. The clamps, which forbid
+    warping, reduce this twist.
     """
     flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
         mechanism
@@ -250,7 +250,7 @@ def body_mass(mechanism: Mechanism) -> np.ndarray:
 
 
 def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
-    """Build symmetric matrices, shape (..., 6, 6), from entries by row and column.
+    """Build symmetric matrices, shape (..., 6, 6), from their entries by (row, column).
 
     The entries are on or above the diagonal; all others are 0.
     """

@@ -42,7 +42,7 @@ def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
 def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
     """Return the modes of stage and leaves by closed forms.
 
-    The leaves bend in phase with the stage, or move while the stage is at rest.
+    In some modes the leaves bend in phase with the stage; in the others they move while the stage is at rest.
     """
     frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))

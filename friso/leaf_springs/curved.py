@@ -44,10 +44,10 @@ def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
 
 
 def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the compliance of a leaf at points x [m], per force and moment, (points, 6).
+    """Return the compliance of a short piece of a leaf, per force and moment, (points, 6).
 
-    Also returns the arc length, (points,), for which each point stands: its `weight` in the integral along x,
-    lengthened by the `slope` of the leaf. All arguments have the shape (points,).
+    The piece is at a point x [m]. Also returned is the arc length, (points,), for which each point stands: its `weight`
+    in the integral along x, lengthened by the `slope` of the leaf. All arguments have the shape (points,).
     """
     s = x - mechanism.length / 2
     sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
@@ -74,8 +74,8 @@ def _resultants(
 ) -> np.ndarray:
     """Return forces and moments at points of a leaf per unit load at its end, (points, 6, 6).
 
-    They act along and about tangent, width and normal. The points x [m] have the `height` [m] and the `slope` of the
-    deflected leaf, shape (points,).
+    They act along and about tangent, width and normal of the leaf. The points have the coordinate x [m], and the
+    `height` [m] and `slope` of the deflected leaf, each of shape (points,).
     """
     cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
     turn = np.zeros((len(x), 3, 3))

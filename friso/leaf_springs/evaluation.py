@@ -97,7 +97,10 @@ class Evaluation:
 
     @property
     def nonlinearity(self) -> float:
-        """Return the largest relative deviation of the force from a constant stiffness."""
+        """Return the largest relative deviation of the force from a straight line through 0.
+
+        The line has the stiffness at deflection 0.
+        """
         linear = self.drive[0] * self.deflections
         return float(np.max(np.abs(self.forces[1:] / linear[1:] - 1)))
 

@@ -93,7 +93,7 @@ class Mechanism:
         )
 
     def member(self, number: int) -> Mechanism:
-        """Return a single mechanism out of many, by its number."""
+        """Return one mechanism, with plain numbers, out of many that are arrays, by its number."""
 
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
@@ -165,7 +165,7 @@ def _triple(section: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]
 
 
 def along_motion(mechanism: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
-    """Return the displacement of a point of the stage along z, (..., modes).
+    """Return the displacement of a point of the stage along z, in each mode, shape (..., modes).
 
     `shapes` (..., 6, modes) are motions of the stage about its reference point, the middle of the leaf ends.
     """

@@ -66,9 +66,9 @@ def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
 
 
 def _number(shapes: np.ndarray) -> str:
-    """Return the number of waves of a shape as a suffix of its name; "" for one wave.
+    """Return the number of waves of a mode as a suffix of its name; "" for one wave.
 
-    Waves are counted on the leaf that moves most.
+    `shapes` (leaves, points) are displacements. Waves are counted on the leaf that moves most.
     """
     settings = LeafSpringSettings.current()
     shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]

@@ -60,7 +60,7 @@ class Curl:
         return cls(poisson, (fast, slow), (a, at_clamp[0] - a), odd)
 
     def shape(self, s: Any, length: Any, derivative: int = 0) -> Any:
-        """Return m - a h1 - b h2 at s, or its second derivative."""
+        """Return m - a h1 - b h2 at s or, if `derivative` is 2, its second derivative."""
         moment = (s if self.odd else 1.0) if derivative == 0 else 0.0
         terms = (
             weight * rate**derivative * _decay(rate, s, length, self.odd)
@@ -164,10 +164,10 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
 
 
 def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
-    """Multiply compliances in torsion along a leaf (n,) by exp(tilt place^2), for some tilt.
+    """Multiply torsional compliances `shares` (n,) by exp(tilt place^2), for a tilt to be found.
 
-    The sum of the compliances stays, so that an even torque twists the leaf as before. Their sum weighted by the square
-    of the `torques` (n,) becomes `weighted_sum`.
+    `places` (n,) run along the leaf. The tilt makes the sum of the compliances, weighted by the square of the `torques`
+    (n,), equal to `weighted_sum`. Their plain sum stays, so that an even torque twists the leaf as before.
     """
     settings = LeafSpringSettings.current()
     tilt, total = 0.0, shares.sum()

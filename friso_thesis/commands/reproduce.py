@@ -16,7 +16,7 @@ from friso_thesis.commands.unfinished import kept_until_done
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
-    """Judge the claims, from where an interrupted run left off."""
+    """Judge the claims, show the answer, and continue from where an interrupted run left off."""
     from friso.interface.output_folder import UNFINISHED
     from friso_thesis.studies.thesis.kept import Kept
 

@@ -74,5 +74,5 @@ class KeptWork:
 
 @cache
 def _built_on() -> str:
-    """Return a description of all that decides on a result besides friso's code."""
+    """Return a text on machine and libraries: all that decides on a result besides friso's code."""
     return f"{machine()}, scipy {version('scipy')}"

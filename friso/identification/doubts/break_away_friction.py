@@ -38,10 +38,10 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramps: Ramps) -> float | None:
-    """Return the friction [N] at which motions begin if above the static friction's interval.
+    """Return the friction [N] at which motions begin if it exceeds the fitted static friction.
 
-    Returns None otherwise, and with too few ramps in either direction. `determined` has estimates by key, `flat` the
-    fitted stage, and `ramps` the forces at which motions begin.
+    Returns None if it does not exceed the interval of static friction, or with too few ramps in either direction.
+    `determined` has estimates by key, `flat` the fitted stage, and `ramps` the forces at which motions begin.
     """
     static = determined.get("friction.static")
     sides = [side for _, side in by_direction(ramps.directions)]
@@ -60,9 +60,9 @@ def friction_beyond(determined: Mapping[str, Any], flat: Mapping[str, Any], ramp
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Return by how much friction may exceed static friction [N] at or below speeds [m/s], (n,).
+    """Return how far friction can exceed static friction [N], up to each of the speeds [m/s].
 
-    Viscous friction may rise faster than the Stribeck curve falls.
+    The result has the shape (n,). Viscous friction may rise faster than the Stribeck curve falls.
     """
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, DoubtSettings.current().speeds_of_a_start)[:, None] * speeds

@@ -61,7 +61,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
     """Return the changes during a record, from its smooth `velocity` [m/s], shape (n,).
 
-    The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes.
+    The changes are fitted together with the parameters, starting from the fit. Returns None if nothing clearly changes,
+    and for a fit without Coulomb friction.
     """
     if "friction.coulomb" not in fit.problem.names:
         return None
@@ -75,7 +76,7 @@ def changing_forces(
     """Build the forces by which friction and a constant force could change along a record.
 
     `velocity` [m/s] is the record's. Each force, shape (n,), changes along a straight line in either half of the
-    record. Also returns the sizes [N] at which forces are tried, and the shapes of the changes.
+    record. Also returns the sizes [N] at which the forces are simulated, and the two shapes of change, (n,) each.
     """
     settings = DoubtSettings.current()
     unit = settings.friction_share_of_a_tried_force * fit.value("friction.coulomb")
@@ -107,9 +108,9 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
 
 
 def _drift(explained: ExplainedResidual | None, bends: Sequence[np.ndarray]) -> RecordDrift | None:
-    """Compute the changes along a record from the fitted sizes of their shapes, `bends`.
+    """Compute changes of friction and constant force from the fitted sizes of their shapes.
 
-    Returns None if nothing was explained.
+    `bends` are the shapes, (n,) each. Returns None if the changes explained nothing.
     """
     if explained is None:
         return None
@@ -144,7 +145,7 @@ def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseMode
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield friction and a constant force that change along the record."""
+    """Yield the forces by which friction and a constant force could change along the record."""
     if "friction.coulomb" in case.fit.problem.names:
         yield TriedForces(*changing_forces(case.fit, case.velocity)[:2])
 

@@ -14,7 +14,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: RecordCase) -> Iterator[RaisedDoubt]:
-    """Compare control laws that are fitted to the whole record and to two parts of it.
+    """Fit a control law to the whole record and to two parts of it, and compare the gains.
 
     A law is the force as a linear function of error, its derivatives and integral. The parts are divided by an instant,
     by speed of the reference, or by place. One linear controller has equal gains in all parts, whatever the machine
@@ -101,7 +101,7 @@ def _deviations(signals: np.ndarray, stretch: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _ratio(usual: np.ndarray, force: np.ndarray) -> float:
-    """Return the factor from the usual force to a force, (rows,) [N]; 1 if not proportional."""
+    """Return the ratio of a force to the usual force, (rows,) [N]; 1 if their shapes differ."""
     likeness = float(usual @ force) / (float(np.linalg.norm(usual) * np.linalg.norm(force)) or 1.0)
     if likeness < DoubtSettings.current().likeness_of_a_law:
         return 1.0

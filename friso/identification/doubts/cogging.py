@@ -27,7 +27,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield forces at several places along the way, then one with the best-fitting pitch."""
+    """Yield forces at several places along the way, then one sine with the best-fitting pitch."""
     settings, problem = DoubtSettings.current(), case.fit.problem
     position, counted = case.log["position"][case.log.longest], problem.counted > 0
     travel = float(np.ptp(position))
@@ -43,9 +43,10 @@ def forces(case: FittedCase) -> Iterator[TriedForces]:
 
 
 def places_along(position: np.ndarray) -> list[np.ndarray]:
-    """Return a triangle for each of several places along the way [m], (n,), less its mean.
+    """Return a triangular function of position for each of several places, (n,), minus its mean.
 
-    The triangle is 1 at its place and 0 from the neighbouring places on. The first place has none.
+    `position` [m] has the shape (n,). A function is 1 at its place, and 0 from the neighbouring places on. The first
+    place has none.
     """
     nodes = np.linspace(position.min(), position.max(), DoubtSettings.current().places_of_a_force_along)
     near = np.maximum(1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0]), 0.0)
@@ -59,9 +60,9 @@ def _waves(position: np.ndarray, pitch: float) -> list[np.ndarray]:
 
 
 def _explained_by(position: np.ndarray, pitch: float, rest: np.ndarray) -> float:
-    """Return the power [N^2] of a residual force, (n,), that a force with a pitch [m] explains.
+    """Return the power [N^2] of a residual force that a sine with a pitch [m] explains.
 
-    The constant part does not count.
+    `position` [m] and the residual `rest` [N] have the shape (n,). The constant part of the force does not count.
     """
     columns = np.stack([*_waves(position, pitch), np.ones(len(rest))], axis=1)
     solution = np.linalg.lstsq(columns, rest, rcond=None)[0]

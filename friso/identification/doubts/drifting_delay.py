@@ -16,7 +16,7 @@ from friso.identification.settings import DoubtSettings
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Name the delays at beginning and end if a changing delay explains more than a constant one."""
+    """Name the delays at the record's ends if a drift explains more than a constant delay."""
     effect = case.led_by("drifting-delay")
     if effect is None:
         return
@@ -29,9 +29,10 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield the derivative of the force, and its product with a ramp over the record.
+    """Yield the forces that a constant and a growing delay add.
 
-    Nothing is yielded unless a changing delay explains more than a constant one.
+    They are the derivative of the force, and its product with a ramp over the record. Nothing is yielded unless a
+    changing delay explains more than a constant one.
     """
     force = delay_force(case)
     if case.fit.problem.closed or not force.any():

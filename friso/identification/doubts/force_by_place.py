@@ -25,10 +25,10 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 
 
 def _places(position: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Return a triangle, (n,), by name, for each of several places along the way.
+    """Return a triangular function of position, (n,), for each of several places, by name.
 
-    It is 1 at its place and 0 from the neighbouring places on. The first place has none; a log with few `rows` gives
-    {}.
+    A function is 1 at its place, and 0 from the neighbouring places on. The first place has none. The result is {} for
+    a log with few `rows`.
     """
     settings = DoubtSettings.current()
     count = min(settings.places_of_a_force, rows // settings.rows_for_each_place)

@@ -1,4 +1,4 @@
-"""Doubt: friction differs between forward and backward motion by more than its level."""
+"""Doubt: forward and backward friction differ in more than their levels."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Fit forward and backward motion separately, if the common fit does not explain both.
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both directions. If these
-    differ, the common fit need not lie between them, so deviations are widened to reach both results, beyond chance. If
-    the model lacks something, the search starts from everywhere in the parameters' ranges, because the common fit may
-    be far from either direction's optimum.
+    differ, the common fit need not lie between them, so intervals are widened to reach both results. If the model lacks
+    something, starts spread over the whole ranges of the parameters, because the common fit may be far from either
+    optimum.
     """
     both, settings = case.fit, DoubtSettings.current()
     if both.explains(case.quality.noise):

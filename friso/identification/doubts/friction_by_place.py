@@ -27,7 +27,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:
-    """Yield a separate friction at each of several places along the way."""
+    """Yield friction that is larger at one place, for each of several places along the way."""
     settings = DoubtSettings.current()
     if "friction.coulomb" not in case.fit.problem.names:
         return

@@ -13,8 +13,9 @@ from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Compare the force that accelerates the masses with the residual beyond noise.
 
-    Any part of the residual may pass for inertia, so a mass with less inertia is not determined. The mass's relative
-    uncertainty is at least the squared ratio of residual to inertia (friso's choice).
+    Any part of the residual may pass for inertia. A mass is withheld if its inertia force is smaller than the residual.
+    Otherwise the relative uncertainty of the mass is at least the squared ratio of residual to inertia (friso's
+    choice).
     """
     masses = {key: one for key, one in case.determined.items() if key in ("masses.cart", "masses.stage")}
     inertia = sum(mass.value for mass in masses.values()) * float(np.sqrt(np.mean(case.acceleration**2)))

@@ -41,8 +41,8 @@ def find(case: RecordCase) -> Iterator[RaisedDoubt]:
 def fed_forward(case: RecordCase) -> tuple[InverseModel, np.ndarray] | None:
     """Fit the inverse model with feedforward of the reference's acceleration and direction.
 
-    Also returns the part [N] in proportion to the acceleration, shape (rows,). Returns None without a reference, or if
-    nothing is missing.
+    Also returns the missing force [N] that is in proportion to the acceleration, shape (rows,). Returns None without a
+    reference, or if nothing is missing.
     """
     log, inverse = case.log, case.inverse
     columns = _of_reference(log, inverse.bandwidth)

@@ -41,8 +41,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 def forces(case: FittedCase) -> Iterator[TriedForces]:
     """Yield the force that the motor does not need while its load is loose, by width of play.
 
-    The whole mass is taken as load, with and without friction; with friction it slows down while it is loose. Widths
-    that the load crosses within a few samples are not tried, because motion between samples would look like play.
+    The whole mass is taken as load, once without friction, and once with friction that slows it down while it is loose.
+    Widths that the load crosses within a few samples are not tried, because motion between samples would look like
+    play.
     """
     settings, fit, step = DoubtSettings.current(), case.fit, case.log.sample_time
     if not {MASS, "friction.coulomb"} <= {*fit.problem.names}:

@@ -20,9 +20,9 @@ SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Refuse friction of a record that is too slow for the Stribeck effect to decay.
 
-    Such a record shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. If
-    the Stribeck velocity is not determined, it may be the highest of any bearing. If it is, the effect is small at
-    twice that velocity, and hardly depends on the assumed exponent.
+    Such a record shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. The
+    record must reach a multiple of the Stribeck velocity. If the velocity is not determined, it may be the highest of
+    any bearing, which the record must reach.
     """
     if "friction.stribeck_velocity" not in case.flat:
         return

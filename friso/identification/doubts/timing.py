@@ -51,9 +51,9 @@ def _doubling(most: float) -> list[int]:
 
 
 def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
-    """Fit the inverse model with the force delayed by `lag` and the motion averaged over `width`.
+    """Fit the inverse model with the force delayed by `lag`, the motion averaged over `width`.
 
-    Both count samples. A negative `width` averages the force instead.
+    `lag` and `width` are numbers of samples. A negative `width` averages the force instead.
     """
     moved = _force_moved(case.log, lag, max(-width, 1))
     return inverse_model(moved, case.inverse.bandwidth, False, case.cart_share, averaged=max(width, 1))
@@ -62,8 +62,8 @@ def _with_timing(case: RecordCase, lag: int, width: int) -> InverseModel:
 def _error_of_equal_averages(case: RecordCase, lag: int, width: int) -> float:
     """Return the error of the inverse model with force and motion averaged alike.
 
-    The force is `lag` samples later, and both are averaged over `width` samples. The error serves as a check: averaging
-    the force alone merely hides fast residuals.
+    The force is `lag` samples later. `width` is negative; both are averaged over its size in samples. The error serves
+    as a check: averaging the force alone merely hides fast residuals.
     """
     if width >= 0:
         return np.inf

@@ -62,7 +62,7 @@ def static_from_ramps(log: Log, mass: float = 0.0) -> BreakAway:
 def _claims_together(courses: Sequence[Course]) -> str | None:
     """Return why logs hold force ramps from rest.
 
-    Returns None unless each has a ramp and all have enough together.
+    Returns None unless every log has a ramp, and all logs together have enough.
     """
     ramps = [course.ramps for course in courses]
     enough = all(ramps) and sum(ramps) >= ReadingSettings.current().fewest_ramps
@@ -70,12 +70,12 @@ def _claims_together(courses: Sequence[Course]) -> str | None:
 
 
 def _partial(log: Log) -> bool:
-    """Tell whether a log has too few ramps to determine static friction by itself."""
+    """Tell whether a log alone has too few ramps to determine static friction."""
     return len(static_from_ramps(log).ramps.times) < ReadingSettings.current().fewest_ramps
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
-    """Analyse a log of force ramps, with the moving mass known beforehand."""
+    """Analyse a log of force ramps, with the moving mass from experiments or the stage file."""
     (log,) = logs
     assert isinstance(log, Log)
     return static_from_ramps(log, sum(prior.masses(log)))

@@ -72,7 +72,7 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
 
 
 def _partial(log: Log) -> bool:
-    """Tell whether a log has too few speeds for a curve of friction over speed."""
+    """Tell whether a log alone has too few speeds for a curve of friction over speed."""
     steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
     return not steady or distinct(np.array(steady)) < ReadingSettings.current().speeds_of_a_line
 

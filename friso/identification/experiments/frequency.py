@@ -45,8 +45,8 @@ def _claims(course: Course) -> str | None:
 def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     """Return estimates of masses and joint from responses in newtons and metres.
 
-    They are those of the two-mass model, if it was fitted. If only a mass line shows, where the response falls as of
-    one mass, its mass is the stage's or the total, whichever is nearer. A resonance nearer to the parasitic mode than
+    Estimates come from the two-mass model, if it was fitted. If only a mass line shows, where the response falls as of
+    one mass, this mass is the stage's or the total, whichever is nearer. A resonance nearer to the parasitic mode than
     to the joint's mode leaves the joint's stiffness undetermined. The result is empty for other units.
     """
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
@@ -80,7 +80,7 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:
-    """Return the model's resonance [Hz] if it is nearer to the parasitic mode than to the joint.
+    """Return the model's resonance [Hz] if nearer to the parasitic mode than to the joint's.
 
     Returns None otherwise, and for a stage without a joint or a parasitic mode.
     """

@@ -36,8 +36,9 @@ OUT_OF_STEP = (
 def _claims(course: Course) -> str | None:
     """Return why a log holds moves, or None.
 
-    The reference of such a log moves, or it has no periodic excitation and no series of constant speeds or force ramps.
-    Without a reference its position rests in between, or its force has few frequencies, as with sines.
+    The reference of such a log moves. Otherwise it has no series of constant speeds or force ramps, and its driving
+    signal must meet one of two conditions. It does not repeat, and the log has no reference; or it repeats with rests
+    in between, or with few frequencies, as sines do.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if course.reference_moves:
@@ -88,7 +89,7 @@ def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, 
 
 
 def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
-    """Return the determined estimates with their correlation in the fit."""
+    """Return the determined estimates with their correlation in the fit; none without estimates."""
     return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 
@@ -118,7 +119,7 @@ def _span(log: Log) -> str:
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
-    """Simulate another log with a reference; return None if the machine's own loop is not known."""
+    """Simulate another log; None if it lacks a reference, or the own loop is not simulated."""
     if "reference" not in log or result.loop is None:
         return None
     return simulated_log(result, log, prior.flat(log) or None)
@@ -127,7 +128,8 @@ def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: Analysis
 def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
     """Check that logs can be identified in the machine's loop, and another log simulated.
 
-    Raises InputError otherwise.
+    The user must have given the stage. One of the logs needs a reference, and the other log position, force and
+    reference. Raises InputError otherwise.
     """
     check_roles(other, ("position", "force", "reference"))
     prior.flat(other)

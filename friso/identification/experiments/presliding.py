@@ -83,10 +83,11 @@ class Presliding:
 class _Fit:
     """A fit of mass and bristles to signals below one low-pass frequency.
 
-    `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife; `doubt` is how much of
-    each the residual may hide. `late` [s] is the delay of the force beyond the assumed delay. `ends` is true if the
-    search for the bending stopped at a limit, and `left` is the unexplained fraction of the friction. Low-passed
-    signals over time [s], shape (n,), are the position of the body on the bearing, its force and the model's.
+    `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife. `doubt`, shape (3,),
+    is how far the residual may have shifted each value. `late` [s] is the delay of the force beyond the assumed delay.
+    `ends` is true if the search for the bristles' bending q stopped at a limit. `left` is the unexplained fraction of
+    the friction. Low-passed signals over time [s], shape (n,), are the position of the body on the bearing, its force
+    and the model's.
     """
 
     values: np.ndarray
@@ -286,7 +287,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 
 def _at_most(total: Estimate) -> Estimate:
-    """Return the damping of the bristles as at most `total`, which includes viscous friction."""
+    """Return the damping with an upper bound only: `total` includes unknown viscous friction."""
     if not total.determined:
         return total
     why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"

@@ -49,8 +49,8 @@ DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --st
 class MassOnBristles:
     """Mass and bristles from other experiments.
 
-    Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles each have the half-width of their interval;
-    `exponent` is that of the Stribeck curve.
+    Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles are pairs: a value and the half-width of its
+    interval. `exponent` is that of the Stribeck curve.
     """
 
     mass: tuple[float, float]
@@ -194,9 +194,10 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
-    """Return the scales of the five fitted numbers, in the order of `_Equation`.
+    """Return the scales of the five fitted numbers, in the order of `_Equation`, shape (5,).
 
-    Forces have the mean size of the force [N], the Stribeck velocity the RMS velocity [m/s].
+    Forces have the mean size of the record's force [N], below `cutoff` [Hz]; the Stribeck velocity has the RMS velocity
+    [m/s].
     """
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
@@ -255,8 +256,8 @@ def _estimates(
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """Convert fitted logarithms to friction and Stribeck velocity, with their correlation.
 
-    `best`, shape (5,), are the fitted numbers, of which the first three count. They have a covariance, shape (3, 3),
-    and possible `shifts`, shape (m, 3); `left` is the unexplained fraction of the friction.
+    `best`, shape (5,), are the fitted numbers, of which the first three count. They have a covariance, shape (3, 3).
+    `shifts`, shape (m, 3), are their changes by systematic errors. `left` is the unexplained fraction of the friction.
     """
     settings = ReadingSettings.current()
     coulomb, more, stribeck = np.exp(best[:3])

@@ -123,7 +123,10 @@ def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
 
 
 def _scale(position: np.ndarray, spans: list[slice]) -> float:
-    """Return the size of the larger steps [m]: the median without small steps."""
+    """Return the usual size of the larger steps between plateaus `spans` [m]; 0 without steps.
+
+    It is the median of all steps that are not small against the largest.
+    """
     levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
     sizes = np.abs(np.diff(levels))
     return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0

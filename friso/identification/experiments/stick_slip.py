@@ -150,7 +150,7 @@ def _pull(
 ) -> tuple[np.ndarray, float]:
     """Return the low-passed force on the cart [N], and the relative error of its scale.
 
-    It is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`. Raises
+    The force is the `stiffness` [N/m] times the deflection or, without a stiffness, the actuator force `pushed`. Raises
     InputError for a stiffness that is not positive, and if the log has neither signal.
     """
     if stiffness is None:
@@ -203,7 +203,7 @@ def _peak(
 
 
 def _unseen(speed: np.ndarray) -> float:
-    """Count the samples for which motion may have been hidden in noise.
+    """Estimate for how many samples before its first visible one a motion was hidden in noise.
 
     `speed`, shape (n,), runs from the first visible sample to the maximum. Before, it is taken to have doubled in equal
     times, as in its first visible doubling. An evenly accelerating body would be hidden for less.
@@ -226,10 +226,10 @@ def _why(shares: list[float]) -> str:
 def _answer(
     table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, relative_error: float, stiffness: Estimate, why: str
 ) -> StickSlip:
-    """Make the result of the analysis from the `table` of all slips, one row per quantity.
+    """Make the result from the `table` of all slips: a row per quantity, a column per slip.
 
-    `why` says why a direction may have no slips. Static friction has only a lower bound if, before most slips, the pull
-    had stopped rising or the joint was at its stroke.
+    `pull` [N] and `velocity` [m/s] are the cart's over time. `why` says why a direction may have no slips. Static
+    friction has only a lower bound if, before most slips, the pull had stopped rising or the joint was at its stroke.
     """
     settings = ExperimentSettings.current()
     times, places, directions, bent, forces, rates, speeds, held, late = table
@@ -276,7 +276,7 @@ def _answer(
 
 
 def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
-    """List notes for the reader of the result."""
+    """List notes on the zero of the force, on unequal directions, and on few slips."""
     notes = []
     if count and not offset.determined:
         notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
@@ -328,7 +328,7 @@ def _both(forward: Estimate, backward: Estimate) -> Estimate:
 def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     """Return half of the difference between forward and backward break-away force.
 
-    It is not determined if the cart slips in one direction only.
+    The offset is not determined if the cart slips in one direction only.
     """
     name, method = (
         "offset of the force on the cart",

@@ -65,7 +65,7 @@ class LawComparison:
 
     @property
     def explained(self) -> bool:
-        """Tell whether any law predicts the left-out parts of the record."""
+        """Tell whether the best law predicts the left-out parts of the record well enough."""
         return self.predictions[0].error < LawSettings.current().error_of_a_prediction
 
     @property
@@ -100,7 +100,7 @@ def _worse(differences: np.ndarray, level: float) -> bool:
 
 
 def comparable() -> list[str]:
-    """List the laws with stiction that measured friction can be converted into."""
+    """List the friction laws with stiction to which measured friction can be converted."""
     return [
         name
         for name, law in FRICTION.classes.items()

@@ -21,9 +21,8 @@ from friso.stage.tables import friction_law
 class DraggedRecord:
     """A log as a body dragged along the measured motion.
 
-    Over `time` [s] the record has the position [m] of the body on the bearing, shape (n,). Inside the record,
-    low-passed, shape (m,), it has the force [N] after the drive's delay and the acceleration [m/s^2] of the whole
-    moving mass.
+    Over `time` [s] the record has the position [m] of the body on the bearing, shape (n,). Force [N], after the drive's
+    delay, and acceleration [m/s^2] of the whole moving mass are low-passed, and left out at the ends: shape (m,).
     """
 
     name: str
@@ -38,10 +37,10 @@ class DraggedRecord:
         return float(self.low_pass.time[1] - self.low_pass.time[0])
 
     def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Return the low-passed friction force [N] of laws along the record, shape (runs, m).
+        """Return the low-passed friction force [N] of several laws along the record, (runs, m).
 
-        The laws have one structure; `flat` has their keys with numbers or arrays of shape (runs,). Failed runs are NaN.
-        The bristles start unbent.
+        The laws are of one kind, and differ in their numbers: `flat` has their keys with numbers or arrays of shape
+        (runs,). Failed runs are NaN. The bristles start unbent.
         """
         settings = LawSettings.current()
         law = flat["friction.model"]
@@ -83,7 +82,7 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 
 
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
-    """Choose the parts of the records to leave out in turn.
+    """Divide the records into the parts that are left out of a fit in turn.
 
     Each part is a list with one mask of shape (m,) per record. With at least `pieces` records, each record is a part;
     otherwise each is cut into equally many pieces in time.

@@ -21,7 +21,7 @@ FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "
 
 @dataclass(frozen=True)
 class LawFit:
-    """A law fitted to records: mass [kg], keys of the law [SI], and the fitted numbers."""
+    """A law fitted to records: mass [kg], keys of the law [SI], and the fitted logarithms."""
 
     law: str
     mass: float
@@ -31,7 +31,7 @@ class LawFit:
 
 @dataclass(frozen=True)
 class LawProblem:
-    """A law to be fitted to records, with the prior mass [kg] and friction.
+    """A law to be fitted to records, with the mass [kg] and friction assumed before the fit.
 
     The Stribeck exponent is not fitted.
     """
@@ -48,7 +48,7 @@ class LawProblem:
 
     @property
     def start(self) -> np.ndarray:
-        """Return the prior values of the fitted numbers (logarithms), shape (parameters,)."""
+        """Return the fitted numbers (logarithms) as assumed before the fit, shape (parameters,)."""
         settings = LawSettings.current()
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
@@ -73,7 +73,7 @@ class LawProblem:
         return np.concatenate([centre - far, low]), np.concatenate([centre + far, high])
 
     def keys(self, numbers: np.ndarray) -> dict[str, float]:
-        """Return the keys of the law [SI] for given numbers, shape (parameters,)."""
+        """Return the keys of the law [SI] that belong to fitted numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
         before = self.before.levels
@@ -89,9 +89,9 @@ class LawProblem:
         return law.shaped(measured, {name: value[name] for name in law.shape})
 
     def errors(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Return the residual force [N] of each record about its mean, shape (rows, m).
+        """Return each record's residual force [N], minus its mean, as an array of shape (rows, m).
 
-        `rows` has fitted numbers, shape (rows, parameters). Residuals of a failed run are infinite.
+        Each row of `rows`, shape (rows, parameters), has fitted numbers. Residuals of a failed run are infinite.
         """
         columns = [self.keys(row) for row in rows]
         flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}

@@ -71,7 +71,7 @@ def read_log(
 
 
 def _undecided(proposal: Proposal) -> list[str]:
-    """Return a line for each role for which several channels are possible, with an option."""
+    """Return a line for each role with several possible channels, and an option to choose one."""
     return [
         f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"
@@ -121,7 +121,7 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
-    """Write lines on the origin of the sample times."""
+    """Write lines that say where the sample times of the log come from."""
     if reading.mapping.sample_time is not None:
         return [
             f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
@@ -134,7 +134,10 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
 
 
 def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
-    """Bring one role's channel to even instants, and add its remarks to the notes."""
+    """Bring one role's channel, with its instants [s] and values, to even instants.
+
+    Its remarks are added to the notes.
+    """
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
@@ -171,7 +174,7 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
 
 
 def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
-    """List warnings about the signals for the engineer.
+    """List warnings for the engineer about the signals of a log.
 
     Signals may be constant or clipped, and position may contradict velocity or lag behind the force. `base` has the
     common instants.
@@ -197,7 +200,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 
 
 def _lost(base: Track) -> list[str]:
-    """Write how many samples were lost and interpolated; [] if none were."""
+    """Write how many samples were lost and interpolated, as a list of one line; [] if none were."""
     if not base.bridged.any():
         return []
     places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
@@ -218,6 +221,6 @@ def _spans(base: Track) -> str:
 
 
 def _instant(base: Track, number: int) -> str:
-    """Write the time of a sample; rounding errors at the beginning become 0."""
+    """Write the time of a sample [s], by its number; rounding errors about 0 become 0."""
     time = float(base.time[number])
     return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

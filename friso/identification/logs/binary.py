@@ -133,9 +133,10 @@ def _from_hdf5(item: Any, file: Any) -> Any:
 
 
 def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """Return the fields of a MATLAB structure, or a list of structures.
+    """Return a MATLAB structure as a dict, or an array of structures as a list of dicts.
 
-    `children` are the fields, converted. If all fields hold references, `item` is an array of structures.
+    `item` is the HDF5 group, and `children` are its fields, converted. If all fields hold references, `item` is an
+    array of structures.
     """
     import h5py
 
@@ -226,12 +227,12 @@ def _plain(node: Any) -> Any:
 
 
 def most_bytes(size: int) -> int:
-    """Return the largest pickled size of the contents of a file of a given size."""
+    """Return how many bytes a file's pickled contents may have, by the file's `size` [B]."""
     return MOST + PER_BYTE * size
 
 
 def _too_much(size: int, most: int) -> str:
-    """Return the message on a file that would take too much memory."""
+    """Return the message on a file of a `size` [B] that would take over `most` bytes of memory."""
     return f"it would take {size / 1e6:.0f} MB of memory, and a file of its size has at most {most / 1e6:.0f} MB"
 
 

@@ -180,9 +180,10 @@ def _by_mechanics(
 
 
 def _of_units(reading: Reading, chosen: Mapping[str, AssignedRole], against: bool) -> list[LogError]:
-    """List errors for missing units; if units or names imply a rotary axis, for that axis.
+    """List errors for missing units.
 
-    A force that acts `against` the motion that it causes gets a negative scale as its example.
+    If units or names of channels imply a rotary axis that the user did not state, the first error asks for the kind of
+    axis. A force that acts `against` the motion that it causes gets a negative scale as its example.
     """
     gaps = {role: gap for role, choice in chosen.items() if (gap := unit_gap(choice, reading)) is not None}
     turning = [gap for gap in gaps.values() if gap.example == TURNS]
@@ -251,7 +252,8 @@ def _is_of_another(role: str, unit: str) -> bool:
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
     """Choose the measured channel among channels that move alike, and say why.
 
-    The measured channel is the only one whose name says so, or the noisiest. The channel is None if that is unclear.
+    The measured channel is the only one whose name says that it was measured, or else the noisiest. The channel is None
+    if that is unclear.
     """
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role not in KINDS or len(alike) == 1:

@@ -27,8 +27,9 @@ def is_needed(
 ) -> bool:
     """Tell whether a needed position must be computed as the integral of the velocity.
 
-    This is so if no channel is or could be a position, if the user assigned a velocity and no position, or if the
-    `best` reading by mechanics has a velocity.
+    This is never so if a channel has, or competes for, the role of position. Otherwise the `best` reading by mechanics
+    decides, if there is one. Without it, there must be a velocity, which the user assigned, or beside which no other
+    channel could be a position.
     """
     velocity = proposal.chosen.get("velocity")
     if "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:

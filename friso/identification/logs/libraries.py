@@ -25,9 +25,9 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 
 
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
-    """Write a line for each channel with fewer samples than the (truncated) file states.
+    """Write a line for each channel that has fewer samples than the (truncated) file states.
 
-    `stated` has the number for each channel, or None. Returns [] if no channel is shorter.
+    `stated` has the stated number for each channel, or None. Returns [] if no channel is shorter.
     """
     return [
         f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"

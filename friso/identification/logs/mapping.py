@@ -66,8 +66,9 @@ class Mapping:
     def beside(self, newer: Mapping) -> Mapping:
         """Return the statements of this mapping that a newer one does not replace.
 
-        A sample time is replaced by a channel of times or its unit, a channel of times by a sample time, a scale by
-        another channel for its role, and a role by another role for its channel.
+        Statements are replaced by others on the same role or channel. A sample time is also replaced by a channel of
+        times or its unit, and a channel of times by a sample time. A scale ends if its role gets another channel, and a
+        role if its channel gets another role.
         """
         timed = "time" in newer.roles or any((role_of(name) or ("",))[0] == "time" for name in newer.units)
         used = {*newer.roles.values()}

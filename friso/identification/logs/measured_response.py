@@ -38,9 +38,10 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """Return the kind of a response's column by its heading; None for other columns.
+    """Return what a column of a response holds, such as "phase", by its heading, or None.
 
-    Text before brackets counts first ("FRF (real)", "Magnitude (re 1 N)").
+    Others are coherence, imaginary and real part, magnitude and frequency. Text before brackets counts first ("FRF
+    (real)", "Magnitude (re 1 N)").
     """
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
     shown = (set(words(text)) for text in (re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name), name))
@@ -109,8 +110,9 @@ def _frequency(column: Channel, path: Path) -> np.ndarray:
 
 
 def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
-    """Build complex values from magnitude and phase; return them with scale, unit and words.
+    """Build complex values from magnitude and phase.
 
+    Returns the values, the factor that converts them to SI, the SI unit, and a description of both units in words.
     Raises LogError for a phase without a unit.
     """
     turn = unit_factor(phase.unit, "rad") if phase.unit else None
@@ -131,7 +133,7 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
 
 
 def response_unit(text: str) -> tuple[float, str, str]:
-    """Return the factor to SI, the SI unit, and a description; unknown units are kept."""
+    """Return factor to SI, SI unit, and a description; unknown units keep their text, factor 1."""
     text = spelled(text)
     for si in (*RESPONSES, "m"):
         if text and unit_factor(text, si) is not None:

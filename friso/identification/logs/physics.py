@@ -119,7 +119,10 @@ def leads(one: Channel, other: Channel) -> bool:
 
 
 def _filled(channel: Channel) -> np.ndarray | None:
-    """Return a channel's values with lost samples interpolated; None if few or constant."""
+    """Return a channel's values minus their mean, over their range; lost ones interpolated.
+
+    Returns None for a channel with few values, or a constant one.
+    """
     finite = np.isfinite(channel.values)
     if finite.sum() < LogSettings.current().samples_of_a_reading or not np.ptp(channel.values[finite]) > 0:
         return None
@@ -131,7 +134,11 @@ def _filled(channel: Channel) -> np.ndarray | None:
 
 
 def _reading(force: Channel, motion: Channel, kind: str, values: np.ndarray, moved: np.ndarray) -> MotionReading:
-    """Fit inertia and friction to a pair of channels, at several time scales."""
+    """Fit inertia and friction to a pair of channels, at several time scales.
+
+    `values` and `moved`, shape (n,), are the samples of force and motion, without gaps. `kind` tells whether the motion
+    is a position or a velocity.
+    """
     settings = LogSettings.current()
     rows = []
     while len(values) >= settings.samples_of_a_reading:

@@ -39,7 +39,7 @@ class Preamble:
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
     """Read the lines above a table with columns of the given names.
 
-    Contradicting intervals are dropped.
+    If lines state different sampling intervals, none is used.
     """
     settings = LogSettings.current()
     lines = [line for line in lines if line.strip()]

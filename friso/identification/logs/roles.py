@@ -248,7 +248,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
 
 
 def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
-    """Return the only channel in a unit of the role and with an uninformative name, or None."""
+    """Return the only channel in a unit of the role whose name implies none; else None."""
     used = {id(channel) for channel in taken}
     fits = [
         channel
@@ -274,7 +274,8 @@ def of_no_signal(name: str) -> bool:
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
     """Return the only candidate whose name is exactly the role, or the word for it; else None.
 
-    `matches` are the candidates with the words that imply the role; a single candidate gives None.
+    `matches` are the candidates with the words that imply the role. If there is just one candidate, the result is None,
+    too.
     """
     if len(matches) < 2:
         return None

@@ -160,7 +160,8 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
     """Tell whether a channel without a unit is taken as SI.
 
-    This is so if the user assigned it, the format has no units, and it is no current or voltage in place of a force.
+    The user must have assigned the channel, and the format must have no units. A current or voltage in place of a force
+    is never taken as SI.
     """
     bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
     return bare and not _electric_unit(choice)

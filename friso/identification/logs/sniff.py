@@ -136,7 +136,7 @@ def is_number(cell: str, decimal: str) -> bool:
 def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
     """Tell whether cells, of which some are `numeric`, are a row of values.
 
-    A row has numbers, gaps and time stamps, and with `words` a few words (a state).
+    A row has numbers, empty cells and time stamps. With `words`, it may have a few words instead, such as a state.
     """
     numbers = sum(numeric)
     rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
@@ -244,7 +244,7 @@ def _headings(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return names and units per column from one or two lines above the numbers; () for none.
 
-    The numbers begin at line `first`, from 0, and stand in `columns` columns.
+    The numbers begin at line `first`, counted from 0, in as many columns as `columns` says.
     """
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]

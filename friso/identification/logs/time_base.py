@@ -246,7 +246,7 @@ def _same_instants(first: Track, second: Track) -> bool:
 
 
 def _coincident(base: Track, other: Track) -> bool:
-    """Tell whether two tracks share their sampling instants within the other's first segment."""
+    """Tell whether instants of a track fall on those of another, in the other's first segment."""
     part = other.segments[0]
     inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
     steps = (inside - other.time[part.start]) / other.period

@@ -87,7 +87,7 @@ def spelled(text: str) -> str:
 
 
 def _below(part: str, before: str) -> str:
-    """Return the unit text after an operator, in brackets if it is a product below a stroke.
+    """Return the unit text after an operator, in brackets if it is a product after a slash.
 
     `before` is the operator. Without brackets "rad/N*m" would read as rad/N times m.
     """
@@ -141,8 +141,8 @@ _KINDS = (
 def split_heading(heading: str) -> tuple[str, str]:
     """Split a heading into name and unit: "Position (mm)" is ("Position", "mm").
 
-    Text in square brackets is a unit unless it is an index; text in parentheses, after a stroke or after "in" only if
-    it is a known unit ("current (filtered)" has none): "x/mm", "Kraft in N". In "Speed m/s" the stroke belongs to the
+    Text in square brackets is a unit unless it is an index. Text in parentheses, after a slash or after "in" is a unit
+    only if it is known: "x/mm", "Kraft in N", but not "current (filtered)". In "Speed m/s" the slash belongs to the
     unit, and "Gain A/V" has none. Otherwise a name may end with its unit, and keeps it: "angle_deg".
     """
     heading = heading.strip()
@@ -193,8 +193,8 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
 def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:
     """Return the factor of a scale such as "35.1507 N/V", and the unit assumed for the channel.
 
-    The factor leads to the SI unit of the role on that axis. A channel without a unit gets the unit after the scale's
-    stroke. Raises LogError for units that do not fit role and channel.
+    The factor leads to the SI unit of the role on that axis. A channel without a unit gets the unit after the slash.
+    Raises LogError for units that do not fit role and channel.
     """
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
     role_unit = axis.unit(ROLES[role])
@@ -220,7 +220,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
 
 
 def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
-    """Return the SI value of a scale's part above the stroke.
+    """Return the SI value of the part of a scale before its slash.
 
     Raises LogError for a part in another unit than `role_unit`.
     """

@@ -15,9 +15,9 @@ from friso.identification.readings.common import turns_of
 class Coverage:
     """Steady speeds and starts of motion in a record; they decide what a fit can show.
 
-    `steady` has speeds of steady motion [m/s], ascending, one per stretch. `starts` has, for each stretch between
-    turning points, the distances [m] covered at its samples, NaN where inertia outweighed friction. `resolution` [m] is
-    the smallest visible displacement, `slowest` [m/s] the lowest visible speed.
+    `steady` has the mean speeds of pieces of steady motion [m/s], ascending. `starts` has an array for each stretch
+    between turning points: the distances [m] covered at its samples, NaN where inertia outweighed friction.
+    `resolution` [m] is the smallest visible displacement, `slowest` [m/s] the lowest visible speed.
     """
 
     steady: np.ndarray
@@ -26,9 +26,10 @@ class Coverage:
     slowest: float
 
     def shows_speed(self, speed: float) -> bool:
-        """Tell whether there is steady motion near a speed [m/s], both below and above it.
+        """Tell whether the record has steady motion near a speed [m/s], both below and above it.
 
-        Friction falls around the Stribeck velocity; steady motion on one side of it alone does not show the fall.
+        Friction falls around the Stribeck velocity; steady motion on one side of this velocity alone does not show the
+        fall.
         """
         settings = OutputErrorSettings.current()
         below = (self.steady >= speed / settings.speed_factor_of_coverage) & (self.steady < speed)
@@ -37,10 +38,10 @@ class Coverage:
 
     @property
     def gap(self) -> tuple[float, float]:
-        """Return the range of speeds [m/s], widest by ratio, without steady motion.
+        """Return the range of speeds [m/s], widest by ratio, in which there is no steady motion.
 
-        It lies between neighbouring steady speeds, or below the lowest. Without steady motion it has no upper end
-        (infinite).
+        The range lies between neighbouring steady speeds, or below the lowest. If there is no steady motion at all, its
+        upper end is infinite.
         """
         speeds = np.concatenate([[self.slowest], self.steady]) if self.steady.size else np.array([self.slowest, np.inf])
         widest = int(np.argmax(speeds[1:] / speeds[:-1]))
@@ -103,5 +104,5 @@ def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, 
 
 
 def _speeds(speed: np.ndarray, length: int) -> np.ndarray:
-    """Cut a stretch into pieces of about `length` samples, and return their mean speeds [m/s]."""
+    """Cut the speeds of a stretch into pieces of about `length` samples; return the means [m/s]."""
     return np.array([piece.mean() for piece in np.array_split(speed, max(1, len(speed) // length))])

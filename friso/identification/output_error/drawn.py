@@ -46,7 +46,10 @@ def drawn_from(
 
 
 def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
-    """Sample values evenly from the whole range of a parameter, shape (machines,)."""
+    """Sample values evenly from the whole range of a parameter in the fit, shape (machines,).
+
+    The values are in SI units, and even in the logarithm for a logarithmic parameter.
+    """
     settings = OutputErrorSettings.current()
     return parameter.outer(
         rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), settings.machines_drawn)
@@ -54,7 +57,10 @@ def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Compute a fit parameter of sampled machines from their keys; None if keys are missing."""
+    """Return a fit parameter of sampled machines, (machines,), by their keys; None without them.
+
+    `values` has arrays by key, and `name` is the parameter.
+    """
     if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
         if not masses or (name == SHARE and len(masses) < 2):

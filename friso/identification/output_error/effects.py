@@ -18,9 +18,9 @@ from friso.intervals import COVERAGE
 class ExplainedResidual:
     """What additional forces, which the model leaves out, explain of a fit's residual.
 
-    `moved` is the shift of the fitted numbers, shape (free,); `sizes` are the fitted sizes of the forces; `left` is the
-    fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining residual, and `slopes` its
-    derivatives by numbers and sizes.
+    `moved`, shape (free,), is the shift of the fitted numbers. `sizes`, shape (forces,), are the fitted sizes of the
+    forces, and `left` is the fraction of the residual's power that remains. `rest` [N], shape (n,), is the remaining
+    residual, and `slopes`, shape (n, numbers + forces), its derivatives by numbers and sizes.
     """
 
     moved: np.ndarray
@@ -30,7 +30,7 @@ class ExplainedResidual:
     slopes: np.ndarray
 
     def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last force is present: its size differs from 0 by more than its error.
+        """Tell whether the last additional force is present: its size is not 0 within its error.
 
         The error allows for residuals that repeat at every reversal. With a slow sine, a coupling or a delay cannot
         then be told from slightly different friction.
@@ -47,8 +47,8 @@ def explained_by_forces(
 ) -> ExplainedResidual | None:
     """Fit additional forces to the residual of a fit, while its parameters may change, too.
 
-    Each force [N], shape (n,), has size 1; it is simulated at its size in `units`, small enough to be linear. Returns
-    None if the forces explain no more than the best of `searched` random ones.
+    A force [N], shape (n,), is that of an effect of size 1. It is simulated at its size in `units`, small enough to be
+    linear. Returns None if the forces explain no more than the best of `searched` random ones.
     """
     rest, slopes = fit.linearised
     return explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted, searched)
@@ -82,7 +82,7 @@ def explained_by(
 
 
 def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units: Sequence[float]) -> bool:
-    """Tell whether the last force is needed even if all parameters of the model may change.
+    """Tell whether a residual shows the last of some forces even if all parameters may change.
 
     `forces` [N], shape (n,) each, have size 1; `units` are the sizes at which they are simulated.
     """
@@ -108,14 +108,15 @@ def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
-    """Return the fit with its intervals widened by `further`, shape (free,), each way."""
+    """Return the fit with intervals extended at both ends by `further`, shape (free,)."""
     return fit.with_deviations(fit.deviation + further / COVERAGE)
 
 
 def effects_of(forces: Sequence[np.ndarray], units: Sequence[float], fit: OutputErrorFit) -> list[np.ndarray]:
     """Return the change of a fit's residual per unit of each additional force, shape (n,) each.
 
-    Each force [N], shape (n,), has size 1 and is simulated at its size in `units`. All are simulated side by side.
+    A force [N], shape (n,), is that of an effect of size 1, and is simulated at its size in `units`. All forces are
+    simulated side by side.
     """
     inputs, (rest, _), sizes = fit.problem.inputs, fit.linearised, np.array(units)[:, None]
     pushed = replace(fit.problem, inputs=replace(inputs, force=inputs.force + sizes * np.array(forces)))

@@ -25,7 +25,7 @@ from friso.progress import Progress, Tally, share_of, silent
 class OutputErrorFit:
     """A fit of the whole model to a log, with the uncertainty of its numbers.
 
-    `inner` has the fitted numbers, shape (parameters,), of which those numbered in `free` were fitted. Their
+    `inner`, shape (parameters,), has all numbers of the model; those with the indices `free` were fitted. Their
     `covariance` has the shape (free, free), and the `residual` [N] the shape (n,).
     """
 
@@ -46,9 +46,10 @@ class OutputErrorFit:
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
     def explains(self, noise: float, closely: bool = False) -> bool:
-        """Tell whether the residual is about the log's `noise` [N]; the limit is tighter if `closely`.
+        """Tell whether the residual is about as large as the noise, `noise` [N], of the log's force.
 
-        For a stage that follows the log, only a part of the noise passes into the residual.
+        With `closely`, the limit is tighter. For a stage that follows the log, only a part of the noise passes into the
+        residual.
         """
         settings = OutputErrorSettings.current()
         times = settings.noise_ratio_of_a_closed_fit if closely else settings.noise_ratio_of_an_explained_record
@@ -72,8 +73,8 @@ class OutputErrorFit:
     def is_noise_of_motion(self, noise: float) -> bool:
         """Tell whether noise of the logged motion explains the whole residual.
 
-        Such noise accumulates and resembles slow effects. `noise` [N] is the force noise of the log. False if noise of
-        the motion is small beside it.
+        Such noise accumulates and resembles slow effects. `noise` [N] is that of the logged force. The result is False
+        if noise of the motion is small beside it.
         """
         return self.problem.shaking[0] > 0 and self.left <= self.problem.noise_left(noise)
 
@@ -135,9 +136,10 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray, progress: Pro
 def fits(
     problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray, progress: Progress = silent
 ) -> list[OutputErrorFit]:
-    """Fit several problems that differ only in the samples that count, from the same starts.
+    """Fit several problems that differ only in the samples that count, from equal starts.
 
-    The starts are simulated once for all of them.
+    The starts, shape (starts, parameters), are simulated once for all problems. `free` has the indices of the
+    parameters to fit.
     """
     pieces, works = _parts(problems[0], len(starts)), 1 + len(problems)
     ranked = _ranked(problems, pieces, starts, share_of(progress, 0, works))
@@ -221,7 +223,7 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 def _ranked(
     problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray, progress: Progress
 ) -> list[np.ndarray]:
-    """Return the best starts of each problem, (tried, parameters), including the first start."""
+    """Return the best starts of each problem, (tried, parameters), and always the first start."""
     settings = OutputErrorSettings.current()
     if len(starts) <= settings.starts_refined_first:
         return [starts] * len(problems)
@@ -237,7 +239,7 @@ def _ranked(
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
-    """Choose the stretches of a record over which starts are simulated.
+    """Return the stretches of a record over which `starts` starts are simulated.
 
     A short record is used whole. Of a long one in closed loop the beginning is used, because its later state is
     unknown; otherwise stretches from all over it, because slow motion may come last.
@@ -298,10 +300,10 @@ def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.nd
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return the shift of the fitted numbers by other inputs that the log allows, shape (free,).
+    """Return the shift of the fitted numbers, (free,), by other inputs that the log allows.
 
-    `best` are the numbers, `rest` [N] their residual, (n,), and `slopes` its derivatives, (n, free). The shift is 0 if
-    the simulation with the other `inputs` fails.
+    `best`, shape (parameters,), are the numbers of the model, `rest` [N], (n,), their residual, and `slopes`, (n,
+    free), its derivatives. The shift is 0 if the simulation with the other `inputs` fails.
     """
     settings = OutputErrorSettings.current()
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest

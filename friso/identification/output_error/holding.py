@@ -14,7 +14,7 @@ from friso.identification.output_error.settings import OutputErrorSettings
 
 
 def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
-    """Smooth the position of a log less and less, as long as the fit improves.
+    """Refit with the position of a log smoothed less and less, as long as the fit improves.
 
     Smoothing blurs the instants of break-away: for stick-slip motion without noise, a Stribeck exponent of 2 was fitted
     as 1.47 and the bristles a fifth too soft. Too little smoothing passes the noise of the position on to the force.
@@ -30,8 +30,8 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     """Fit the force of a log as held and as interpolated between samples; return the better fit.
 
-    Both differ by half a sample, which shifts bristle damping by half a sample times the bristle stiffness. If the
-    better fit explains the force to its `noise` [N], and the worse fits clearly worse, the worse is ruled out.
+    A held force acts half a sample later, which shifts bristle damping by half a sample times the bristle stiffness.
+    The worse fit is ruled out if it is clearly worse, and the better one explains the force to its `noise` [N].
     Otherwise both stay possible, and intervals allow for both.
     """
     settings = OutputErrorSettings.current()

@@ -36,8 +36,9 @@ The last step refits the determined parameters.
 class IdentifiableFit:
     """A fit, and the names of the parameters that the record determines.
 
-    `profiles` has, by name, the profiles of parameters that not every motion shows, and `shown` the names of the
-    determined ones. `refuted` has the reason for each parameter that something else in the record contradicts.
+    `shown` has the names of the determined parameters, apart from those that every motion determines. `profiles` has a
+    profile by name for each parameter that only some motions determine. `refuted` has the reason for each parameter
+    that something else in the record contradicts.
     """
 
     fit: OutputErrorFit
@@ -128,11 +129,12 @@ def _identifiable_on_log(
 def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
-    """Refit all others for several values of each uncertain parameter; decide which to report.
+    """Decide which uncertain parameters of a fit to report, by refitting all others.
 
-    Uncertain parameters are those that not every motion shows: all but the `core`. If the fit has `explained` the
-    record, a sharp interval from these refits suffices. Otherwise the motion must also cover the parameter's effect,
-    and only such parameters are examined. A clearly better fit among the refits replaces `full`.
+    Uncertain parameters are those that not every motion shows: all but the `core`. For each, all others are refitted at
+    several of its values, which gives its profile and interval. A narrow, closed interval suffices if the fit has
+    `explained` the record. Otherwise the motion must also cover the parameter's effect; no other parameter is examined.
+    A clearly better fit among the refits replaces `full`.
     """
     names = full.problem.names
     profiles: dict[str, Profile] = {}
@@ -192,9 +194,10 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 
 
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
-    """Drop the Stribeck curve unless its height and its velocity are both determined.
+    """Return the determined parameters, without the Stribeck curve if one half of it is missing.
 
-    Only those of the two that are `optional` must be; `identifiable` are the names of determined parameters.
+    The halves are the curve's height and its velocity. A half that is not among the `optional` parameters cannot be
+    missing. `identifiable` are the names of determined parameters.
     """
     effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - set(CURVE)
@@ -221,7 +224,8 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     """Tell whether the motion covers the speeds or displacements at which a parameter acts.
 
-    Bristles must also swing slowly enough to be sampled. True for parameters that act in any motion.
+    For bristles, their swing must also be slow enough for the sampling. The result is true for parameters that act in
+    any motion.
     """
     if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
@@ -234,7 +238,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
 
 
 def why_not_shown(name: str, covered: Coverage) -> str:
-    """Return in a sentence why a parameter is not determined."""
+    """Return in a sentence why a record does not determine the parameter `name`."""
     if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):

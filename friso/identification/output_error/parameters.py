@@ -26,7 +26,7 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
 @dataclass(frozen=True)
 class FitParameter:
-    """A parameter of the fit with its SI unit, start value and range.
+    """A parameter of the fit with its SI unit, start value and range [SI].
 
     The fitted number is the logarithm of a `logarithmic` parameter, otherwise its value. Every motion determines a
     `core` parameter. For each of the others, the fit tests whether this motion determines it.

@@ -35,7 +35,7 @@ PASSES = 5 / 8
 class Simulated:
     """Simulated records of position, velocity and the controller's force, in SI units.
 
-    Each has the shape (runs, n), or (n,) of one run, and is NaN after a failure.
+    All records have the shape (runs, n), or (n,) for one run, and are NaN after a failure.
     """
 
     position: np.ndarray
@@ -84,8 +84,8 @@ class Problem:
     def noise_left(self, noise: float) -> float:
         """Return the RMS residual [N] that noise alone leaves, if the force has this `noise` [N].
 
-        In closed loop the residual is the noise itself. For a stage that follows the log it is the noise passed by the
-        guiding controller, (2 w s + w^2) / (s + w)^2, plus the controller's response to position noise.
+        In closed loop the residual is the noise itself. For a stage that follows the log, the guiding controller passes
+        only slow noise. The controller's response to position noise is added.
         """
         if self.closed:
             return noise
@@ -109,7 +109,7 @@ class Problem:
     def part(self, samples: slice) -> Problem:
         """Return the problem on a stretch of the samples.
 
-        A stretch that begins later than the first sample starts on the reference.
+        If the stretch begins later than the first sample, the stage starts with position and velocity of the reference.
         """
         reference = self.inputs.reference[samples]
         inputs = replace(self.inputs, reference=reference, force=self.inputs.force[samples])
@@ -128,7 +128,7 @@ class Problem:
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
-        """Simulate one run; its signals have the shape (n,)."""
+        """Return the simulated record for fitted numbers (parameters,); its signals are (n,)."""
         ((_, record),) = self.simulated(inner[None])
         return Simulated(record.position[0], record.velocity[0], record.force[0])
 
@@ -158,11 +158,11 @@ class Problem:
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual of fitted numbers, (parameters,), and its derivatives.
+        """Return the residual [N], (n,), of fitted numbers, and its derivatives, (n, free).
 
-        The derivatives by the `free` numbers have the shape (n, free). At each sample the smaller of the differences to
-        both sides counts: a break-away that a step just causes, or prevents, appears on one side only and is no
-        derivative.
+        The fitted numbers `inner` have the shape (parameters,); derivatives are by the `free` ones. At each sample the
+        smaller of the differences to both sides counts: a break-away that a step just causes, or prevents, appears on
+        one side only and is no derivative.
         """
         numbers = np.flatnonzero(free)
         ahead = np.array([self._step(inner, int(i)) for i in numbers])
@@ -180,14 +180,14 @@ class Problem:
         return at, np.where(np.abs(to) <= np.abs(fro), to, fro).T
 
     def _step(self, inner: np.ndarray, i: int) -> float:
-        """Return the step of fitted number `i` for derivatives, away from its range's nearer end."""
+        """Return the step of number `i` by which derivatives are taken, towards its range's middle."""
         settings = OutputErrorSettings.current()
         parameter = self.parameters[i]
         size = settings.derivative_step * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
         return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """Return the states in which runs begin: where the log begins, at its speed.
+        """Return the states in which runs begin: position and velocity of the log's beginning.
 
         The bristles are bent as far as the first force bends them.
         """

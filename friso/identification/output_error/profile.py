@@ -62,9 +62,9 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray, limit: float) -> Refined:
-    """Fit the other parameters at each of the `values` of one, the parameter `number`.
+    """Fit all other parameters at each of the `values` of the parameter with the index `number`.
 
-    A fit whose mean square would stay above `limit` is abandoned.
+    The `others` are indices. A fit whose mean square would stay above `limit` is abandoned.
     """
     settings = OutputErrorSettings.current()
     starts = np.repeat(fit.inner[None], len(values), axis=0)
@@ -92,9 +92,10 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
 
 
 def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.ndarray:
-    """Return how far the other numbers shift per shift of one, to first order, shape (others,).
+    """Return how far other fitted numbers shift per shift of one, to first order, (others,).
 
-    The one has the index `number`. The shifts are 0 if it is not fitted.
+    `number` is the index of the one, and `others` are those of the other numbers. The shifts are 0 if the one is not
+    fitted.
     """
     if number not in fit.free:
         return np.zeros(len(others))
@@ -109,8 +110,8 @@ def _following(fit: OutputErrorFit, number: int, others: tuple[int, ...]) -> np.
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
     """Find where a profile crosses the limit on either side of its minimum.
 
-    `cost` belongs to each of the `values`. Returns the lower and upper end, and for each whether the profile does not
-    cross there; the end is then that of the values.
+    `cost`, of the shape of `values`, is the profile. Returns the lower and the upper end, and for each end whether it
+    is open. Where the profile does not cross the limit, the end is open, and is the first or last of the `values`.
     """
     lowest = int(np.argmin(cost))
     left, right = values[0], values[-1]

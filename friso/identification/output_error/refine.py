@@ -96,7 +96,7 @@ def refine_fit(
 
 
 def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return J' J and J' r of each row of numbers, from Jacobian J and residual r.
+    """Return J' J and J' r for each row of fitted numbers, from Jacobian J and residual r.
 
     Entries are 0 for numbers that are not `free`.
     """

@@ -66,11 +66,11 @@ def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[
 
 
 def _to_the_farther_end(deviation: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Widen standard deviations until their intervals reach the upper end of logarithmic ones.
+    """Widen standard deviations until intervals reach the upper ends of logarithmic intervals.
 
-    An interval symmetric in the logarithm of a value is not symmetric in the value. If it reaches 0.5 each way, its
-    ends lie 65 % above the value and 39 % below. For the upper end, deviations relative to `values` above 1 count as 1.
-    No deviation becomes smaller.
+    An interval that is symmetric in the logarithm of a value reaches farther above the value than below: if it is 0.5
+    each way, 65 % above and 39 % below. The deviation is taken from the upper end. Relative deviations above 1 count as
+    1 for this. No deviation becomes smaller, and a deviation of a value 0 stays.
     """
     size = np.abs(values)
     relative = np.divide(deviation, size, out=np.zeros_like(size), where=size > 0)
@@ -83,7 +83,7 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 
 
 def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
-    """Return why parameters, or keys that follow from them, are not determined."""
+    """Return, by name, why parameters, or keys that follow from them, are not determined."""
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
@@ -107,7 +107,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
 
 
 def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
-    """Widen the covariance of fitted numbers so that their intervals reach as far as profiles."""
+    """Widen the covariance of fitted numbers so that intervals reach as far as closed profiles."""
     spread = fit.deviation
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
@@ -122,7 +122,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
 
 
 def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
-    """Return the keys of the stage file for fitted numbers."""
+    """Return the keys of the stage file with the SI values that follow from fitted numbers."""
     values = {
         parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
     }
@@ -130,7 +130,7 @@ def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
 
 
 def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
-    """Return the stage-file keys, and their derivatives by fitted numbers, (keys, parameters)."""
+    """Return stage-file keys, and their derivatives by the fitted numbers, (keys, parameters)."""
     at = _keys_at(fit, fit.inner)
     step = 1e-6
     moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]
@@ -138,10 +138,11 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 
 
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
-    """Return the range [SI] that any bearing may have of a parameter that is not determined.
+    """Return the range [SI] that is left to a parameter that the record does not determine.
 
-    `owner` is the parameter's name. For the ratio of static to Coulomb friction the range is one of static friction.
-    The fitted value is no bound, because it compensates for what the model lacks.
+    `owner` is the parameter's name. The range is the one that the parameter has in the fit, for any bearing. For the
+    ratio of static to Coulomb friction it is a range of static friction. The fitted value is no bound, because it
+    compensates for what the model lacks.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     parameter = parameters[owner]

@@ -193,7 +193,8 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
 def cutoff_of(record: BearingRecord) -> float:
     """Choose the low-pass [Hz] of a record: the bandwidth of its motion, within limits.
 
-    It is at most a fraction of the sampling frequency, and at least some periods fit into the record.
+    The low-pass is at most a fraction of the sampling frequency, and at least so high that several of its periods fit
+    into the record.
     """
     settings = ReadingSettings.current()
     highest = motion_bandwidth(record.body, record.interval)
@@ -206,8 +207,8 @@ def cutoff_of(record: BearingRecord) -> float:
 def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return position [m], force [N] and acceleration [m/s^2] at the bearing, each (n,).
 
-    The force is delayed by drive and current loop. The acceleration times the whole moving mass is the inertia force.
-    `mass` [kg] determines the force through a compliant contact.
+    The force is delayed by drive and current loop. The acceleration is such that the whole moving mass times it is the
+    inertia force. `mass` [kg] determines the force through a compliant contact.
     """
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
     force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
@@ -226,8 +227,8 @@ def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
 def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
     """Return the measured deflection [m] of a joint that bends.
 
-    Returns None if the deflection is not measured, or if the joint is held and deflects no more than its contact
-    `gives` [m].
+    Returns None if the deflection is not measured. Returns None as well if it hardly exceeds its noise, a fraction of
+    the motion, or what the contact of a held joint `gives` [m].
     """
     settings = ReadingSettings.current()
     measured = deflection(log)
@@ -250,7 +251,7 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
 
 
 def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """Return the force [N], shape (n,), that follows a command after delay and current loop."""
+    """Return the force [N], (n,), that follows a commanded force after delay and current loop."""
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
         return late

@@ -145,7 +145,7 @@ def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
 
 
 def robust(values: np.ndarray) -> float:
-    """Return a robust standard deviation by the median absolute deviation; 0 without values."""
+    """Return the standard deviation by the median absolute deviation; 0 without values."""
     if not len(values):
         return 0.0
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
@@ -164,7 +164,7 @@ def noise_of(signal: np.ndarray) -> float:
 def _median(sizes: np.ndarray, digit: float) -> float:
     """Return the median of sizes that were rounded to multiples of `digit` (grouped data).
 
-    Each rounded size stands for all sizes within half a digit of it, none below 0.
+    A rounded size stands for all sizes within half a digit of it, none below 0.
     """
     middle = float(np.median(sizes))
     low = max(middle - digit / 2, 0.0)
@@ -195,7 +195,7 @@ def digit_of(signal: np.ndarray) -> float:
 
 
 def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
-    """Return the samples at which a motion [m], shape (n,), turns back by more than `swing` [m]."""
+    """Return the samples at which a motion [m] turns, to go back by more than `swing` [m]."""
     turns, values = [], position.tolist()
     lowest = highest = values[0]
     low = high = 0
@@ -326,7 +326,10 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
 
 
 def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield each direction by name, with the mask of its samples."""
+    """Yield "forward" and "backward", each with the mask of the samples in this direction, (n,).
+
+    `directions`, shape (n,), are positive or negative numbers.
+    """
     yield "forward", directions > 0
     yield "backward", directions < 0
 

@@ -21,8 +21,8 @@ from friso.identification.response.period import find_periods
 class Repetition:
     """How a signal in a log repeats.
 
-    A period has `samples` samples, effectively `harmonics` harmonics, and `turns` changes of direction. The position
-    rests for the fraction `rests` of the time.
+    `samples` is the length of a period, `harmonics` the effective number of harmonics in it, and `turns` the number of
+    changes of direction. The position rests for the fraction `rests` of the time.
     """
 
     samples: int
@@ -61,9 +61,9 @@ class Course:
 
     @cached_property
     def speeds(self) -> np.ndarray:
-        """Return the constant speeds [m/s], shape (n,), if they cover most of the way.
+        """Return the constant speeds [m/s], shape (n,), at which a body slides over most of its way.
 
-        The reference is not used; the result is empty if the position has no SI unit.
+        The result is empty if they cover less of the way, if a reference moves, or if the position has no SI unit.
         """
         settings = ReadingSettings.current()
         part, position = self.log.longest, self.log["position"]
@@ -102,7 +102,7 @@ class Course:
         settings = ReadingSettings.current()
 
         def mean(first: float, last: float) -> float:
-            """Return the mean force over a part of the rise, relative to the whole."""
+            """Return the mean force over a part of the rise, relative to the force at its end."""
             edges = np.searchsorted(self.log.time, at - lasts * (1 - np.array([first, last])))
             values = self.log["force"][edges[0] : edges[1]]
             return float(values.mean()) / force if values.size else 0.0
@@ -120,7 +120,7 @@ class Course:
         return bool(np.ptp(position) > settings.share_of_most_of_a_way * np.abs(np.diff(position)).sum())
 
     def _slides(self, stretch: Pass) -> bool:
-        """Tell whether a body slides: the force changes by less than its mean over a stretch.
+        """Tell whether a body slides in a stretch: the force changes there by less than its mean.
 
         Otherwise a spring, such as bristles before sliding, determines the speed.
         """
@@ -190,7 +190,7 @@ def external(log: Log) -> str | None:
 def _harmonics(period: np.ndarray) -> float:
     """Return the effective number of harmonics of one period of a signal, shape (samples,).
 
-    It is the number of equally strong harmonics with an equal spread of power.
+    Equally strong harmonics of this number would have the same spread of power.
     """
     power = np.abs(np.fft.rfft(period)[1:]) ** 2
     return float(power.sum() ** 2 / np.sum(power**2))

@@ -140,9 +140,9 @@ def _map(
 
 
 def _length(fields: np.ndarray) -> np.ndarray:
-    """Return the lag at which the autocorrelation of each row falls to 1/e, shape (rows,).
+    """Return the lag at which the autocorrelation of each row of `fields` falls to 1/e, (rows,).
 
-    The lag is a number of places, NaN if the autocorrelation does not fall that far.
+    The lag is counted in places along the row; it is NaN if the autocorrelation does not fall that far.
     """
     count = fields.shape[1]
     power = np.abs(np.fft.rfft(fields, 2 * count, axis=1)) ** 2
@@ -240,7 +240,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
 
 
 def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
-    """Return the variation of the force [N] in passes at each speed [mm/s], the slowest first."""
+    """Return the standard deviations of the force [N] by speed [mm/s], the slowest first."""
     spreads: dict[str, list[float]] = {}
     for m in sorted(maps, key=lambda m: abs(m.velocity)):
         spreads.setdefault(f"{abs(m.velocity) * 1e3:.3g}", []).append(m.spread)
@@ -255,8 +255,8 @@ def _from_to(values: list[float]) -> str:
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
     """Tell whether the force is the friction of the rail, and say in a sentence why or why not.
 
-    The force is not friction of the rail if a pass is unsteady, or if passes over equal places differ. Neither is it if
-    it varies faster than the loop's `crossover` [Hz].
+    It is not if a pass is unsteady, if passes over equal places differ, or if their repeatability is not determined.
+    Neither is it if the force varies faster than the loop's `crossover` [Hz].
     """
     reasons = []
     rough = [m for m in maps if not m.steady]

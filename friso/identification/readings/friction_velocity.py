@@ -93,8 +93,8 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
     """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    Inertia is subtracted. Where the velocity swings, the mean friction errs in proportion to the squared relative
-    swing, which widens the interval.
+    Inertia, `mass` [kg] times the remaining acceleration, is subtracted. The relative swing is the standard deviation
+    of the velocity over the velocity.
     """
     return (
         stretch.velocity,
@@ -165,9 +165,9 @@ def _covariance(
 ) -> np.ndarray:
     """Return the covariance (p, p) of a weighted least-squares solution.
 
-    `inverse` (p, n) leads from the forces to the solution. `scatter` is the residual's variance relative to the
-    `deviations` [N], used if above 1; `levels` are the columns for levels of friction, whose error does not average
-    out.
+    `inverse` (p, n) is the matrix that gives the solution from the forces. `scatter` is the residual's variance
+    relative to the `deviations` [N], used if above 1. `levels` are the columns for levels of friction, whose error does
+    not average out.
     """
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
@@ -176,9 +176,10 @@ def _covariance(
 
 
 def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
-    """Return the standard deviation [N] that all forces share, from their half-widths [N].
+    """Return the standard deviation [N] that all forces share, as read over the same places.
 
-    Forces share it because they were read over the same places.
+    This is the weighted RMS of the deviations that follow from their half-widths `errors` [N]. The weights follow from
+    `deviations` [N].
     """
     return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
 
@@ -279,8 +280,8 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
     """Make estimates for a direction from a Stribeck curve, with intervals for any exponent.
 
     Any exponent counts that the forces leave open. Static friction and Stribeck velocity are determined only if speeds
-    reach below the Stribeck velocity. No number is, except perhaps the exponent, if friction may still fall at the
-    highest speed.
+    reach below the Stribeck velocity. If friction may still fall at the highest speed, nothing is determined, except
+    perhaps the exponent.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:

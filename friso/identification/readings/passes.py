@@ -30,7 +30,7 @@ class Pass:
 
     @property
     def steady(self) -> bool:
-        """Tell whether the velocity hardly swings, slowly or quickly."""
+        """Tell whether the velocity hardly swings, neither slowly nor fast."""
         settings = ReadingSettings.current()
         return self.swing <= settings.swing_of_a_steady_pass * abs(
             self.velocity

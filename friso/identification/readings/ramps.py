@@ -101,11 +101,11 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
 
 
 def _lowest(push: np.ndarray) -> float:
-    """Return the smallest smoothed push [N] during the rest before a motion."""
+    """Return the smallest smoothed force [N] on a body during its rest before a motion."""
     return float(smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp).min())
 
 
 def _half(push: np.ndarray) -> int:
-    """Return the last sample at which a smoothed push, (n,), is below the middle of its ends."""
+    """Return the last sample at which a smoothed force is at most the mean of its end values."""
     smooth = smoothed(push, len(push) / ReadingSettings.current().smoothing_of_a_ramp)
     return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])

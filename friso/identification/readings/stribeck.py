@@ -20,9 +20,9 @@ from friso.identification.readings.settings import ReadingSettings
 
 @dataclass(frozen=True)
 class Possible:
-    """A parameter's best value, the range that the forces allow, and whether that is closed.
+    """A parameter's best value, and the range that the forces allow.
 
-    A range is `closed` unless it reaches an end of the search.
+    The range is `closed` unless it reaches an end of the search.
     """
 
     value: float
@@ -122,13 +122,13 @@ def _better(plain: float, least: float, more: int, left: int) -> bool:
 class _Grid:
     """Least squares of the linear parameters, at each Stribeck velocity and exponent of a grid.
 
-    Shapes are (velocities, exponents): `cost` (squares over variances; infinite where friction would not rise towards
-    rest), the solutions (.., p) and their covariance (.., p, p) with all deviations as stated. If `apart`, each
-    exponent is compared with its own best velocity only.
+    Arrays begin with the axes (velocities, exponents). `cost` is the sum of squares over variances, infinite where
+    friction would not rise towards rest. `solutions` (..., p) have the `covariance` (..., p, p), not yet scaled to the
+    scatter of the residual. If `apart`, each exponent is compared with its own best velocity only.
     """
 
     def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
-        """Solve the grid; its points have the shapes (velocities,) and (exponents,)."""
+        """Solve the grid of Stribeck `velocities` [m/s], (velocities,), and exponents `shapes`."""
         self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
         speeds = forces.speeds
         decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))
@@ -150,9 +150,9 @@ class _Grid:
         return float(self.cost.min())
 
     def around(self, left: int) -> _Grid:
-        """Return a grid around the curves that the forces allow with `left` degrees of freedom.
+        """Return a finer grid around the curves that the forces allow, at `left` degrees of freedom.
 
-        The new grid reaches beyond this one where these curves do. If no curve is possible, this grid is returned.
+        The new grid lies within this one. If no curve is possible, this grid is returned.
         """
         settings = ReadingSettings.current()
         grid = self
@@ -179,9 +179,10 @@ class _Grid:
         return t_value(left) ** 2 * np.maximum(least / left, 1.0) - (self.cost - least)
 
     def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
-        """Return the best curve with its ranges, of `left` degrees of freedom.
+        """Return the best curve of the grid, with the ranges of its parameters.
 
-        `refuted` is stored in the result. Ranges that reach an `outer` Stribeck velocity or exponent are not closed.
+        `left` is the number of degrees of freedom, and `refuted` is stored in the result. Ranges that reach an `outer`
+        Stribeck velocity or exponent are not closed.
         """
         settings = OutputErrorSettings.current()
         forces, open_shape = self.forces, len(self.shapes) > 1
@@ -240,7 +241,7 @@ class _Grid:
 def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
     """Return the range of grid points that lie inside, widened by half a step on each side.
 
-    `points` ascend evenly, with `ratios` by ratio; the mask `inside` has their shape.
+    `points` ascend by equal differences or, if `ratios`, by equal ratios. The mask `inside` has their shape.
     """
     (at,) = np.nonzero(inside)
     scale = np.log(points) if ratios else points

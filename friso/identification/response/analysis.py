@@ -35,9 +35,12 @@ class Bench:
     """Results from the frequency responses of one machine.
 
     `driven` and `other` are the responses from force to position of the driven mass and, if measured, of the other
-    mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. `departs`, `drag` and `explanation`
-    describe the effect of friction at low frequency. `aside` has, for every log, the relative errors with which the
-    model of another log predicts its outputs. `warnings` say what was not found, and why.
+    mass. Mass lines, modes and the two-mass model are fitted within `band` [Hz]. At low frequency, `departs` says where
+    friction bends the response off the mass line. `drag` is the friction that explains it, and `explanation` a
+    simulated test of this.
+
+    `aside` has, for every log, the relative errors with which the model of another log predicts its outputs. `warnings`
+    say what was not found, and why.
     """
 
     logs: tuple[Log, ...]
@@ -157,7 +160,7 @@ def _record(log: Log, output: str) -> ResponseRecord:
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
     """Estimate a response by averages over periods, or by local polynomials if nothing repeats.
 
-    Channels are named as in the log.
+    `records` are the realisations; input and output are named as the log's channels.
     """
     channels = from_log(log, "force", output)[1]
     try:
@@ -172,8 +175,8 @@ def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
     """Keep the spectral lines on which the response of any output stands out of the noise.
 
-    The responses are those of the driven mass and, if measured, of the other; the results, too. Raises InputError for
-    an output that stands out on no line.
+    The responses are those of the driven mass and, if measured, of the other mass; the second result is None without
+    the other. Raises InputError for an output that stands out on no line.
     """
     good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
     usable = [response.at(np.isin(response.frequency, good)) for response in responses]
@@ -198,7 +201,7 @@ def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRan
 
 
 def _top(driven: FrequencyResponse) -> float:
-    """Return the highest frequency [Hz] of the response, plus rounding so that it is included."""
+    """Return the upper end of a band [Hz] that includes the highest frequency of the response."""
     return float(driven.frequency[-1]) * (1 + 1e-9)
 
 
@@ -210,7 +213,10 @@ def _of_all(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to all realisations, and widen intervals to their scatter."""
+    """Fit the two-mass model to all realisations, and widen intervals to their scatter.
+
+    The scatter is that of fits to single realisations.
+    """
     apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
     return widened(fit_two_mass(driven, other, band), apart)
 
@@ -222,7 +228,7 @@ def _single(
     band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
-    """Fit the two-mass model to one realisation, number `which`."""
+    """Fit the two-mass model to a single realisation, the one with the index `which` in `logs`."""
     responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
     return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
 
@@ -237,7 +243,10 @@ def _friction(
 ) -> tuple[Drag | None, Explanation | None]:
     """Return the friction that bends the response off the mass line, and a test of it.
 
-    The test is a simulation with the estimated friction. Either is None if it fails; `warnings` then get the reason.
+    The test is a simulation with the estimated friction. Either result is None if it fails; `warnings` then get the
+    reason.
+
+    Either is None if it fails; `warnings` then get the reason.
     """
     if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None

@@ -111,7 +111,7 @@ def _response(
     coherence: np.ndarray | None,
     sample_time: float,
 ) -> FrequencyResponse:
-    """Make the frequency response to an arbitrary excitation, from its estimates on lines."""
+    """Make the frequency response to an arbitrary excitation from estimates on spectral lines."""
     unknown = np.full(len(frequency), np.nan)
     warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(

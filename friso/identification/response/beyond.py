@@ -46,10 +46,10 @@ def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, par
 
 
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return lower and upper limits of the parameters: delay, hold, and compliances.
+    """Return the lower and the upper limits of the parameters: delay, hold, and compliances.
 
-    Each has the shape (COMPLIANCES + outputs,); compliances have no limits. The model covers frequencies up to `top`
-    [Hz].
+    Both arrays have the shape (COMPLIANCES + outputs,); compliances have no limits. The model covers frequencies up to
+    `top` [Hz].
     """
     late, longest = ResponseSettings.current().periods_of_a_delay / top, _longest(response, 0.5)
     free = np.full(outputs, np.inf)
@@ -57,9 +57,9 @@ def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.nd
 
 
 def believed(response: FrequencyResponse) -> tuple[float, float]:
-    """Return value and deviation [ms^2] of the square of the time for which the force is held.
+    """Return value and standard deviation [ms squared] of the squared time of holding the force.
 
-    The force may be held for none of the sample time up to all of it.
+    They stand for a time between 0 and the whole sample time.
     """
     half = (_longest(response, ResponseSettings.current().periods_of_a_sample) / MILLI) ** 2 / 2
     return half, half
@@ -68,6 +68,6 @@ def believed(response: FrequencyResponse) -> tuple[float, float]:
 def _longest(response: FrequencyResponse, share: float) -> float:
     """Return the sample time [s] of a response or, if not known, the longest that is plausible.
 
-    That is the fraction `share` of the period of the highest frequency.
+    Plausible is at most the fraction `share` of the period of the response's highest frequency.
     """
     return response.sample_time or share / float(response.frequency[-1])

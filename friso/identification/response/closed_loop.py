@@ -37,9 +37,10 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return input and output without the part that repeats periodically.
+    """Return input and output without the part that repeats from period to period.
 
-    The input is None if nothing is left of it.
+    If the input does not repeat, both signals are returned unchanged. If nothing is left of the input, both results are
+    None.
     """
     try:
         periods = find_periods(record.input)
@@ -78,7 +79,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
 
 
 def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
-    """Return the sum of squares that a regression on columns, and a constant, leaves."""
+    """Return the sum of squares that a regression of `target` on columns and a constant leaves."""
     matrix = np.stack([np.ones(len(target)), *columns], axis=1)
     matrix /= np.linalg.norm(matrix, axis=0)
     residual = target - matrix @ np.linalg.lstsq(matrix, target, rcond=1e-13)[0]
@@ -88,7 +89,7 @@ def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
 def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tuple[str, ...]:
     """Describe where estimates without and with the reference differ beyond their deviations.
 
-    Both must have the same spectral lines. The result is empty if they agree.
+    Both responses must have the same spectral lines. The result is empty if they agree.
     """
     settings = ResponseSettings.current()
     _same_lines(direct, indirect)
@@ -137,7 +138,7 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
 
 
 def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
-    """Merge passages through 1 into one, with the middle one's centre and the range of all."""
+    """Merge passages through 1 into one: the middle one's frequency, and the range of all."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 

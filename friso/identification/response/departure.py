@@ -72,7 +72,7 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
-    """Tell whether distortion exceeds the noise on a `part` of the lines, and by which ratio.
+    """Tell whether distortion exceeds noise on the spectral lines `part`, and by which ratio.
 
     The ratio is that of noise with distortion to noise alone. The first result is None, and the ratio NaN, if the
     distortion is not known.

@@ -48,7 +48,7 @@ class ResponseFit:
     def _at(self, of: Callable[[np.ndarray], float]) -> tuple[float, float]:
         """Return the value of a function of the parameters, and its deviation to first order.
 
-        Both may be NaN or infinite for undetermined parameters that overflow.
+        Value and deviation may be NaN or infinite for undetermined parameters that overflow.
         """
         steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
         beside = [_number(of, self.parameters + h) - _number(of, self.parameters - h) for h in np.diag(steps)]
@@ -81,7 +81,7 @@ class ResponseFit:
 
 
 def _number(of: Callable[[np.ndarray], float], parameters: np.ndarray) -> float:
-    """Evaluate a function of parameters; NaN if it overflows."""
+    """Return the value of the function `of` at some parameters; NaN if it overflows."""
     try:
         with np.errstate(all="ignore"):
             return float(of(parameters))

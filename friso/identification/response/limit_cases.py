@@ -94,7 +94,7 @@ def _words(line: StraightLine) -> str:
 
 
 def _verdict(case: str, pairs: Mapping[str, float]) -> str:
-    """Return the case of the cart in words."""
+    """Return in words whether the cart is stuck or sliding, and with which modes of the joint."""
     kinds = [name.split()[0] for name in pairs]
     pair = any(a == "antiresonance" and b == "resonance" for a, b in pairwise(kinds))
     if case == "sliding":

@@ -80,7 +80,10 @@ def straight_lines(
 
 
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
-    """Tell whether the slope of a band can be distinguished from neighbouring slopes."""
+    """Tell whether the slope of a band clearly differs from the next higher and lower slopes.
+
+    `band` has the indices of its first and last spectral line, and its sign.
+    """
     frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
     weight = 1 / (relative**2 / 2 + ResponseSettings.current().scatter_of_a_straight_line ** 2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
@@ -91,9 +94,10 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
 def _parted(
     response: FrequencyResponse, slope: int, first: tuple[int, int, float], second: tuple[int, int, float]
 ) -> bool:
-    """Tell whether there is a mode between two bands, each given by its first and last line.
+    """Tell whether a mode separates two bands of one slope.
 
-    The bands have one slope. A mode takes a line between them far off the level of both.
+    Each band has the indices of its first and last spectral line. A mode shows by a spectral line between the bands
+    whose level is far from that of both.
     """
     lower, upper = sorted([first, second])
     level = _flat(response, slope, 1.0)[1]
@@ -106,9 +110,10 @@ def _parted(
 def _widest(
     response: FrequencyResponse, slope: int, sign: float | None, start: int, stop: int
 ) -> tuple[int, int, float] | None:
-    """Return the first and last line of the widest straight band, with its sign; None if none.
+    """Return the first and last spectral line of the widest straight band, and its sign.
 
-    Lines from `start` to before `stop` are searched. Without a `sign`, both are tried.
+    Spectral lines from `start` to before `stop` are searched. Without a `sign`, both are tried. Returns None if there
+    is no such band.
     """
     signs = (1.0, -1.0) if sign is None else (sign,)
     bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
@@ -150,7 +155,7 @@ def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, 
 
 
 def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndarray, ...]:
-    """Return frequency, log level, phase off the line, and relative deviation, each (lines,).
+    """Return frequency, log level, phase and relative deviation, each of shape (lines,).
 
     The response is multiplied by `sign` and (i omega)^`slope`, so that a straight line of this slope is level and its
     phase is 0.
@@ -229,7 +234,8 @@ def _independent(residual: np.ndarray) -> float:
 def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndarray]:
     """Return the shapes, (lines,), in which a straight line may bend towards the nearer mode.
 
-    With modes equally near on both sides, or none at all, there are two: upwards and downwards in frequency.
+    There is one shape for a nearer mode above the band, or below it. If the modes are equally near, or there is none,
+    both shapes are returned.
     """
     frequency, level = _flat(response, slope, 1.0)[:2]
     inside, mean = frequency[band], np.mean(level[band])

@@ -127,9 +127,9 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
-    """Return a function of the parameters that follows a pole or zero: the nearest to `root`.
+    """Return a function that computes the pole or zero nearest to `root` from parameters.
 
-    It is a pole if `which` is 0, and a zero if it is 1.
+    A pole is followed if `which` is 0, and a zero if it is 1.
     """
 
     def nearest(parameters: np.ndarray) -> complex:

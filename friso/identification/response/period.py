@@ -92,9 +92,10 @@ def _shortest(change: np.ndarray) -> int:
 
 
 def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
-    """Return lags [samples] after which a signal would repeat, but for a slip of its clock.
+    """Return lags [samples] at which a signal nearly repeats, as it would with a drifting clock.
 
-    After two such lags it has changed several times as much as after one. `change` is by lag, and `lags` are searched.
+    After twice such a lag the signal has changed several times as much as after one. `change`, over all lags, is how
+    much it changes; `lags` are those searched.
     """
     settings = ResponseSettings.current()
     inner = lags[2 * lags < len(change)]
@@ -108,7 +109,7 @@ def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:
-    """Return the lag of the minimum of `change` that is reached downhill from `lag`, rising."""
+    """Return the lag of the first minimum of `change` at or above a `lag`."""
     while lag + 1 < len(change) and change[lag + 1] < change[lag]:
         lag += 1
     return lag
@@ -117,7 +118,8 @@ def _lowest(change: np.ndarray, lag: int) -> int:
 def _near(change: np.ndarray, expected: float) -> int:
     """Return the lag within 2 % of an expected one at which the signal repeats best.
 
-    Raises InputError if it does not repeat there, or if the expected lag is beyond half the record.
+    `change` is how much the signal changes over each lag. Raises InputError if it does not repeat there, or if the
+    expected lag is beyond half the record.
     """
     low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
     if not 2 <= expected < len(change):
@@ -130,9 +132,10 @@ def _near(change: np.ndarray, expected: float) -> int:
 
 
 def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
-    """Return the first and the last sample of the stretch of a signal that repeats itself.
+    """Return from which sample to before which a signal repeats itself, with a known period.
 
-    Parts at the beginning and the end are cut off if most of their samples differ from those one period away.
+    The period has a number of `samples`. Parts at the beginning and the end are cut off if most of their samples differ
+    from those one period away.
     """
     change = np.abs(signal[samples:] - signal[:-samples])
     unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)

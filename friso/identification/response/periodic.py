@@ -123,7 +123,7 @@ def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, 
 def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the deviation of the mean response over realisations, and its degrees of freedom.
 
-    Both have the shape (lines,). With few realisations, neighbouring lines share their variance.
+    Both are arrays of shape (lines,). With few realisations, neighbouring spectral lines share their variance.
     """
     settings = ResponseSettings.current()
     outputs, inputs = _relative(records, excited)
@@ -141,7 +141,8 @@ def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) ->
 def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
     """Return the nonlinear distortion (lines,), from the output at lines that are not excited.
 
-    Noise and the linear response to the input at these lines are subtracted. NaN if no line in the band was left free.
+    Noise and the linear response to the input at these lines are subtracted. The result is NaN if fewer than two lines
+    of the band were left free.
     """
     settings = ResponseSettings.current()
     places = np.flatnonzero(excited)

@@ -42,7 +42,10 @@ class RationalShape:
 
 
 class Row(NamedTuple):
-    """A model that was tried: its shape, parameters (p,), criterion, and sum of squares."""
+    """A rational model that was tried, with its parameters (p,).
+
+    `bic` is the Bayesian information criterion, and `squares` the sum of squares over variances.
+    """
 
     shape: RationalShape
     parameters: np.ndarray
@@ -51,10 +54,10 @@ class Row(NamedTuple):
 
 
 def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
-    """Fit models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
+    """Fit rational models with 0, 1, ... modes, at most `most`, as long as one more mode helps.
 
-    The models have a `rigid` body or not. The last result is the best of these models with a constant added. `s` are
-    complex frequencies over a scale, (lines,).
+    The models have a `rigid` body or not. They are fitted to `values` with their `deviation` at complex frequencies `s`
+    over a scale, (lines,) each. The last result is the best of these models with a constant added.
     """
     rows: list[Row] = []
     nonlinear = np.zeros(2)
@@ -114,7 +117,10 @@ def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.n
 
 
 def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
-    """Return the response of a rational model at complex frequencies s [rad/s], shape (lines,)."""
+    """Return the response of a rational model, shape (lines,).
+
+    `s`, shape (lines,), is i times the frequency over a reference frequency, without unit.
+    """
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
@@ -164,7 +170,10 @@ def _another(
 def _eliminated(
     start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
-    """Refine the nonlinear parameters; linear ones follow at each step (Golub, Pereyra 1973)."""
+    """Refine the nonlinear parameters of a model from a start, and return them.
+
+    At each step the linear parameters follow by least squares (Golub, Pereyra 1973).
+    """
     settings = ResponseSettings.current()
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
@@ -179,7 +188,7 @@ def _eliminated(
 def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
-    """Make the tried model, with linear parameters, criterion and sum of squares."""
+    """Make the tried model from its nonlinear parameters: all parameters, `bic` and `squares`."""
     linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
@@ -189,7 +198,7 @@ def _completed(
 def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
     """Return the poles of the modes and the zeros of the response with positive imaginary part.
 
-    Both are relative to the scale of s.
+    Poles and zeros are relative to the scale of s, a reference frequency.
     """
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

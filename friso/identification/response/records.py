@@ -144,8 +144,8 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
     """Write sentences on periods left out: those with another input, and transient ones.
 
-    `alike` marks the periods with equal input, of which the `first` are transient. Nothing is yielded if none is left
-    out.
+    `alike`, shape (periods,), marks the periods with equal input; the `first` ones of these are transient, by number.
+    Nothing is yielded if no period is left out.
     """
     if not alike.all():
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
@@ -156,8 +156,8 @@ def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
 def _slip(driving: np.ndarray, samples: int) -> float:
     """Return by what fraction of a sample a period is longer than `samples`.
 
-    The harmonics of the external signal, shape (periods, lines), turn from one period to the next, in proportion to
-    their numbers.
+    `driving` has the harmonics of the external signal, shape (periods, lines). If a period is longer, their phases
+    advance from one period to the next, in proportion to the number of the harmonic.
     """
     turned = np.sum(driving[1:] * driving[:-1].conj(), axis=0)
     number, weight = np.arange(1, driving.shape[1] + 1), np.abs(turned)
@@ -249,7 +249,7 @@ def _transient_periods(reaction: np.ndarray) -> int:
 def _distance(single: np.ndarray, others: np.ndarray) -> float:
     """Return the squared distance of a period from the mean of others, over their variance.
 
-    The median over its lines is taken.
+    `single`, shape (lines,), and `others`, shape (periods, lines), are spectra. The median over the lines is taken.
     """
     variance = np.maximum(np.var(others, axis=0, ddof=1), np.finfo(float).tiny)
     return float(np.median(np.abs(single - others.mean(axis=0)) ** 2 / variance))

@@ -63,7 +63,7 @@ class FrequencyResponse:
     def band(self) -> ResponseBand:
         """Return the 95 % intervals of magnitude and phase.
 
-        Half the variance lies along the response, half across it.
+        Half of the variance is taken in the direction of the complex response, half across it.
         """
         half = stats.t.ppf(0.975, self.degrees) * self.deviation / np.sqrt(2)
         size, phase = np.abs(self.response), np.unwrap(np.angle(self.response))

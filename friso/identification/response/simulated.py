@@ -83,7 +83,10 @@ def slid(
 
 
 def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
-    """Return the fraction of a response's distance from its mass line that a simulation leaves."""
+    """Return the part of a response's distance from its mass line that a simulation leaves.
+
+    The part is a fraction: 0 if the simulation equals the response, 1 if it does no better than the mass line.
+    """
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)
     )

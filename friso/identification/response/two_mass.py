@@ -49,7 +49,7 @@ class TwoMass:
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
         """Return the complex response of one mass, shape (n,), at frequencies [Hz], shape (n,).
 
-        It is the driven mass if `collocated`, otherwise the other mass, which must have been fitted.
+        If `collocated`, the mass is the driven one, otherwise the other one, which must have been fitted.
         """
         which = 0 if collocated else 1
         return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
@@ -143,7 +143,7 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
 
 
 def _sign(response: np.ndarray) -> float:
-    """Return 1 if the mass follows the force (-180 degrees) on most lines, else -1."""
+    """Return 1 if the mass follows the force (-180 degrees), on average over the lines, else -1."""
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
@@ -197,8 +197,9 @@ def _best(
 ) -> ResponseFit:
     """Fit a two-mass model from several starts; stop at the first good fit, else take the best.
 
-    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside`
-    bounds the parameters beyond the masses, and `held` keeps some near a value.
+    Starts are the best mass ratio on a grid, the models from the modes `seen`, and the second-best ratio. `outside` has
+    the lower and upper bounds of delay, hold and compliances. `held` has prior values and deviations of parameters, by
+    index.
     """
     settings = ResponseSettings.current()
     reach = np.array([FAR] * 3 + [2 * FAR])
@@ -241,13 +242,13 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Return a start with masses, stiffness and damping scaled to the response."""
+    """Return a start with masses, stiffness and damping scaled together to fit the response."""
     scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
     return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
 
 def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
-    """Yield a sentence for each output whose sign was reversed, and for a poor fit."""
+    """Yield a sentence for each output whose sign was reversed, and one for a poor fit."""
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
@@ -257,7 +258,7 @@ def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
 
 
 def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
-    """Convert a fit to estimates of masses and joint, and of derived quantities."""
+    """Return estimates of masses, joint, friction and delay, antiresonance and resonance."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"
 

@@ -1,7 +1,7 @@
 """Draw the charts of the guideline.
 
-They show the edge of hunting over the frequencies that determine it (rates), edges by the laws against computed ones,
-and the rig.
+They show the edge of hunting over the frequencies that determine it, edges by the laws over computed edges, and the
+rig.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 def _both(fit: Fit, which: object) -> Sweep:
     """Return the samples, fitted and held-out, that have an edge and are selected by `which`.
 
-    `which` is a function from the samples' dimensionless groups to booleans, one for each sample.
+    `which` is a function from the dimensionless groups, arrays of shape (count,), to booleans of this shape.
     """
     return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 

@@ -106,7 +106,7 @@ ONE_WINDOW = "with one window (a diagnosis)"
 
 
 def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
-    """Return the errors on held-out samples, by the name of the group of samples."""
+    """Return the errors of both laws on sets of held-out samples, by the name of the set."""
     rows = [
         ("joint locked", guideline.locked.on_test),
         (f"of these {ONE_WINDOW}", guideline.held_out(False, _one_window)),
@@ -181,7 +181,7 @@ def _span_text(ends: tuple[float, float]) -> str:
 
 
 def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, float]]:
-    """Return rows of the value that a study varies, the edge by the law, and the computed edge."""
+    """Return rows of a study's varied value, the edge [Hz] by the law, and the computed edge."""
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 
 

@@ -101,9 +101,9 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
 
 
 def _ways(verdict: ClaimVerdict) -> dict[str, ClaimJudgement]:
-    """Return how a claim is judged by the thesis's peak count and by what attracts the stages.
+    """Return how a claim is judged, by the thesis's peak count and by what attracts the stages.
 
-    One of these is left out if it was not computed or does not matter.
+    The result is by the name of the criterion. A criterion is left out if it was not computed or does not matter.
     """
     findings = {COUNT: verdict.finding, CYCLE: verdict.attracts}
     return {way: finding.judgement for way, finding in findings.items() if finding}

@@ -110,7 +110,7 @@ def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> 
 
 
 def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
-    """Return the figures of the single runs that were made."""
+    """Return the figures of single runs over time (Fig. 5, 13) that were made, by number."""
     made = reproduction.responses.keys()
     figures = {"5": _response(reproduction)} if "locked" in made else {}
     return figures | ({"13": _shares(reproduction)} if {WIDE, NARROW} <= made else {})

@@ -88,7 +88,7 @@ class RemarkRow:
 
 
 def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[RemarkRow]:
-    """Return the remarks that apply.
+    """Return the remarks that apply, with the numbers that show it.
 
     A remark applies if this run has judged its criterion, with the result that the remark expects.
     """
@@ -107,5 +107,5 @@ def as_far(verdict: ClaimVerdict) -> str:
 
 
 def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
-    """Return the claims that hold, of those that the thesis itself lists."""
+    """Return the verdicts on claims that hold and are in the thesis's own list of conclusions."""
     return [verdict for verdict in verdicts if verdict.judgement == "holds" and verdict.claim.listed]

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 class ThesisQuestion:
     """A question that the thesis leaves open.
 
-    `asked` names the section that asks, and `command` answers. A text says what the result means. `answer` is that for
-    the thesis's rig, from stored findings.
+    `asked` names the section that asks it. `command` is the command of friso that answers it, and `shows` says what the
+    result means. `answer` returns the answer for the thesis's rig, from stored findings.
     """
 
     asked: str
@@ -129,9 +129,9 @@ _PARASITIC, _LARGEST = 360.0, 2.5
 
 
 def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
-    """Return the steps of Sec. 3.4.
+    """Return the steps of the thesis's design method (Sec. 3.4), one row each.
 
-    Each has what the thesis does, what friso finds at the thesis's values, and what `friso design` makes of the
+    A row has what the thesis does, what friso finds at the thesis's values, and what `friso design` makes of the
     specification (stored).
     """
     single = reproduction.linear.locked.single if reproduction.linear else None

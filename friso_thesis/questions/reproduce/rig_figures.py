@@ -97,7 +97,7 @@ def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
 
 
 def _plant(hertz: np.ndarray, above: tuple[Series, ...], below: tuple[Series, ...]) -> tuple[Panel, Panel]:
-    """Return panels of magnitude and phase of position over force."""
+    """Return panels of magnitude and phase of position over force, with curves to draw."""
     axis = Axis.of_frequency(hertz)
     return (
         Panel("", axis, Axis("Magnitude", "m/N", log=True, prefixed=False), above),

@@ -47,7 +47,7 @@ def short(text: str) -> str:
 
 
 def numbers(verdict: ClaimVerdict) -> str:
-    """Return the numbers of all parts in one line; "" for a claim that is not covered."""
+    """Return the numbers of all criteria of a claim in one line; "" if it is not covered."""
     return "; ".join(part.number for part in verdict.finding.stated) if verdict.finding else ""
 
 
@@ -83,7 +83,7 @@ def in_draws(verdict: ClaimVerdict, part: int) -> str:
 
 
 def attracts(verdict: ClaimVerdict) -> str:
-    """Return how far a claim agrees, in a word, if it is judged by what attracts the stages.
+    """Return in a word how far a claim agrees by what attracts the stages, not by peak counts.
 
     The result is "" if this was not computed or does not matter.
     """
@@ -122,7 +122,7 @@ def _first_sentence(text: str) -> str:
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
-    """Return the texts below a figure or section, by name.
+    """Return the details of a claim for the end of its section: pairs of a name and a text.
 
     The texts are numbers and reasons that are shortened above, numbers by what attracts the stages, and draws that
     decide nothing. A last text says what another grid or tolerance changes.
@@ -144,7 +144,7 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
 
 
 def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
-    """Return the parts by which friso only tests itself, with the claim to which they belong."""
+    """Return the criteria by which friso only tests itself, each with the number of its claim."""
     return [
         (verdict.claim.id, part)
         for verdict in verdicts

@@ -41,7 +41,7 @@ def _source(result: InPosition, source: str) -> str:
 
 
 def _damping(result: InPosition) -> str:
-    """Say how much of the difference between free and locked more damping in the joint recovers."""
+    """Say how much of the free joint's larger deviation at standstill more damping removes."""
     recovered = result.recovered
     best = int(np.argmax(recovered))
     factor = result.damping / result.own_damping
@@ -105,7 +105,7 @@ def _spectra(result: InPosition) -> Figure:
 
 
 def _over_damping(result: InPosition) -> Figure:
-    """Draw the position error over the damping of the joint.
+    """Draw the RMS position error at standstill over the damping of the joint.
 
     The values of the locked and the free joint are shown for comparison.
     """

@@ -110,7 +110,7 @@ def _irregular(result: CycleComparison) -> str:
 
 
 def _levels(result: CycleComparison) -> str:
-    """Say whether other friction levels make the cycle as slow."""
+    """Say whether other friction levels, or a weaker motor, make the cycle as slow as measured."""
     slow, swing = result.slower(result.levels), result.larger(result.levels)
     matches = np.argwhere(result.as_measured(result.levels))
     if not len(matches):

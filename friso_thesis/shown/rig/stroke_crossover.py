@@ -19,7 +19,7 @@ from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """Say from which crossover and stroke on no rail has counted peaks."""
+    """Say from which crossover and which stroke on no rail has any counted peaks."""
     counts: StrokeCrossover = outcome.result
     count, cells = len(counts.rails), counts.share
     shown = np.isfinite(cells) & (cells > 0)
@@ -40,7 +40,7 @@ def _limit(counts: StrokeCrossover, row: int) -> str:
 
 
 def _needed(counts: StrokeCrossover) -> list[str]:
-    """Say where peaks end: crossover limits by stroke, and the stroke at the stage's crossover."""
+    """Say where counted peaks end, in crossover by stroke, and in stroke at the own crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
     rows = np.flatnonzero(counts.share[:, counts.nearest] > 0)
@@ -77,7 +77,7 @@ def rails_panel(counts: StrokeCrossover) -> Panel:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """Return all results for the JSON document.
 
-    Arrays have the shape (strokes, crossovers, rails), and fractions of rails (strokes, crossovers).
+    Arrays have the shape (strokes, crossovers, rails); fractions of rails have the shape (strokes, crossovers).
     """
     counts: StrokeCrossover = outcome.result
     shares = [

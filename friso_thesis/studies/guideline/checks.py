@@ -1,6 +1,6 @@
 """Simulate samples for long below and above their edge of hunting.
 
-The question is whether all runs come to rest there, however they begin.
+The question is whether runs still swing below the edge, and come to rest above it, however they begin.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ class SimulationCheck:
 
 
 def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
-    """Simulate samples that have an edge of hunting, below and above it; at most `most` of them.
+    """Count the samples that still swing after long runs below and above their edge of hunting.
 
-    The samples are in random order.
+    Of the samples with an edge, which are in random order, the first `most` are simulated.
     """
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))

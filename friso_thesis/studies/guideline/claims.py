@@ -39,10 +39,10 @@ SAME = 0.02
 
 @dataclass(frozen=True)
 class GuidelineClaim:
-    """A claim of the thesis about the edge of hunting.
+    """A claim of the thesis about the edge of hunting, with its judgement.
 
-    It has the claim's place and words, the `result` found, and the `rule` by which it is judged. The `judgement` says
-    in words that it holds, holds in part or differs, or that an edge is unknown.
+    Fields are the claim's place and words, the `result` found, and the `rule` by which it is judged. The `judgement`
+    says in words that the claim holds, holds in part or differs, or that an edge is unknown.
     """
 
     where: str
@@ -211,10 +211,10 @@ class LeastGap:
 
 
 def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
-    """Return the smallest friction gap F_s - F_c [N] with which the rig hunts at `CLAIMED_AT`.
+    """Return the smallest friction gap F_s - F_c [N] with which the rig hunts, at one crossover.
 
-    The gap holds for a `static` friction [N]. It is interpolated linearly, in logarithms, between the points of the
-    edge.
+    The crossover is `CLAIMED_AT` [Hz]. The gap holds for a `static` friction [N]. It is interpolated linearly, in
+    logarithms, between the points of the edge.
     """
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)

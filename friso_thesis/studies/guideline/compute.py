@@ -91,7 +91,10 @@ class Fit:
 
     @property
     def again(self) -> int:
-        """Return the number of samples that hunt in two or more separate ranges of the crossover."""
+        """Return the number of samples that hunt in two or more separate ranges of the crossover.
+
+        Samples of fit and test count.
+        """
         return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
@@ -99,9 +102,9 @@ class Fit:
 class Guideline:
     """All results of the guideline, as in `docs/evidence/guideline.md`.
 
-    They are the number of dimensionless groups by part of the stage, both laws, the worked steps, and what a parasitic
-    mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of the sweeps
-    came from an interrupted run.
+    Fields are the numbers of dimensionless groups by part of the stage, both laws, the worked steps, and what a
+    parasitic mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of
+    the sweeps came from an interrupted run.
     """
 
     samples: int
@@ -159,8 +162,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
 def safe_over_friction(locked: Fit) -> float:
     """Return the factor on the locked law that is safe for the rig, whatever its friction.
 
-    A factor belongs to each range of the ratio of the law's two rates. The largest factor of all ranges in which the
-    rig may lie is returned.
+    Each range of the ratio of the law's two frequencies has a safe factor. The rig's friction may put it into several
+    ranges; the largest factor of these is returned.
     """
     flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
@@ -216,7 +219,7 @@ def checked_samples(samples: int) -> None:
 def group_counts() -> dict[str, Count]:
     """Return the numbers of parameters and dimensionless groups of three structures, by name.
 
-    They are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
+    The structures are the rigid rig, the rig with its joint, and the rig with its parasitic mode as well.
     """
     return {
         "rigid": group_count(plain_rig()),

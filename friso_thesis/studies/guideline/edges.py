@@ -77,7 +77,7 @@ class Edges:
 
 
 def concatenate_edges(parts: list[Edges]) -> Edges:
-    """Return the edges of all stages."""
+    """Return the edges of several groups of stages as one, in the order of the list."""
     return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
 
 
@@ -215,7 +215,7 @@ class _Search:
         self.failed[jumping] = True
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the edges that the steps contain, under the names of `Edges`."""
+        """Return the edges, within the last steps of the search, under the names of `Edges`."""
         excess = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
         crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
         within = (self.low <= crossed) & (crossed <= self.high)

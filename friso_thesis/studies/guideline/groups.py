@@ -71,7 +71,8 @@ PARAMETERS: Mapping[str, Parameter] = {
 class Group:
     """A dimensionless group: `factor` times the parameters to their `powers`.
 
-    It has a meaning in words, and the part of the stage to which it belongs ("stage", "joint" or "parasitic").
+    Stored as well are the group's meaning in words, and the part of the stage to which it belongs ("stage", "joint" or
+    "parasitic").
     """
 
     written: str

@@ -50,8 +50,8 @@ SampleValues = Mapping[str, np.ndarray]
 class Rate:
     """A frequency that enters a law of the edge, in units of sqrt(sigma_0/m).
 
-    It is a factor times dimensionless groups to the fixed powers of `base`, times further groups over their references
-    to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
+    The frequency is a factor times dimensionless groups to the fixed powers of `base`, times further groups, relative
+    to reference values, to fitted powers. Powers are fitted only for those `candidates` that turn out to matter.
     """
 
     name: str
@@ -73,7 +73,10 @@ Exponent = tuple[int, str]
 
 @dataclass(frozen=True)
 class EdgeLaw:
-    """A law of the edge before the fit: the frequencies that enter it, and how they combine."""
+    """A law of the edge before the fit: the frequencies that enter it, and how they combine.
+
+    Its factors and exponents are still open.
+    """
 
     rates: tuple[Rate, ...]
     combine: Combine
@@ -180,7 +183,11 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
 
 
 def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
-    """Fit a law to edges, shape (count,); cross-validation chooses its exponents."""
+    """Fit a law to edges, shape (count,); cross-validation chooses its exponents.
+
+    `values` are the samples' dimensionless groups by name. `locked`, shape (count,), is the edge with the joint locked,
+    for a law that needs it.
+    """
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
     folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS

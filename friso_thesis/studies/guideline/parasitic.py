@@ -38,9 +38,9 @@ class ParasiticLimits:
 
 
 def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
-    """Find the limits for a stage with each of several parasitic modes in place of its own.
+    """Return the crossovers that a stage may have with each of several parasitic modes.
 
-    The stage is sampled like the thesis's drive.
+    Each mode takes the place of the stage's own. The stage is sampled like the thesis's drive.
     """
     modes = []
     for damping in DAMPING_RATIOS:

@@ -85,8 +85,8 @@ def swings_from_any_distance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which stages swing for ever from any of the distances, and for which this is known.
 
-    Both have the shape (count,). Simulations last `periods` periods of a slow cycle. If a run of a stage failed,
-    and no other run keeps swinging, it is unknown.
+    Both results have the shape (count,). Simulations last `periods` periods of a slow cycle. If a run of a stage
+    failed, and no other run keeps swinging, its result is unknown.
     """
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)

@@ -1,4 +1,4 @@
-"""Compute the worked example: the thesis rig, by the laws and directly, side by side."""
+"""Compute the edge of hunting of the thesis rig by the laws and by simulation, side by side."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ThesisCase:
 
 @dataclass(frozen=True)
 class Laws:
-    """The two laws that together give the edge of any stage."""
+    """The law of the edge for a locked joint, and the one for a free joint, which builds on it."""
 
     locked: FittedLaw
     free: FittedLaw
@@ -70,7 +70,10 @@ class Laws:
         return self.free.edge(values, self.locked.edge(values)) * rate
 
     def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return all frequencies [Hz] that enter the laws, by name."""
+        """Return all frequencies [Hz] that enter the two laws, by name.
+
+        Stages are given by keys [SI] with numbers or arrays.
+        """
         values, rate = _shaped(flat)
         return {
             quantity.name: np.exp(log) * rate
@@ -100,7 +103,10 @@ def plain_rig(part: str = "") -> dict[str, Any]:
 
 
 def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
-    """Compute the edge of the rig with each of the changes, rigid or with its joint free."""
+    """Return the edges of the rig with each of several changes, by the law and as computed.
+
+    If `free`, the joint is free, otherwise the rig is one rigid mass.
+    """
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
     keys = {key for change in changes for key in change}

@@ -98,8 +98,8 @@ class WorkedDesign:
 class IsolatorNeed:
     """Whether a machine with a crossover limit [Hz] needs an isolator.
 
-    An isolator is needed if the limit is below `edge` [Hz]. This is the highest locked edge by the law over the
-    friction range, multiplied by its safety factor.
+    An isolator is needed if the limit is below `edge` [Hz]. This is the highest edge by the law of the locked joint
+    over the friction range, times a safety factor.
     """
 
     limit: float
@@ -142,7 +142,10 @@ class Worked:
 
 
 def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
-    """Return the friction forces [N] that the rig may have."""
+    """Return the pairs of static and Coulomb friction [N] that the rig may have, as keys.
+
+    Each static friction is combined with each of the `gaps`, fractions of it.
+    """
     return [{"friction.static": force, "friction.coulomb": force * (1 - gap)} for force, gap in product(STATIC, gaps)]
 
 

@@ -186,9 +186,9 @@ def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:
-    """Return the drive's keys that switch off the encoder's noise and resolution, with value 0.
+    """Return the keys that switch off the encoder's noise and resolution, with value 0.
 
-    The result is empty if the `source` of the disturbance is the encoder or all sources together, or without a drive.
+    The result is empty if the `source` of the disturbance is "encoder" or "all", or if the stage has no drive.
     """
     if source in ("encoder", "all") or stage.drive is None:
         return {}
@@ -203,7 +203,10 @@ def _recorded(
 
 
 def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return time [s] after `since`, and the true deviation [m] of the first run from then on."""
+    """Return time [s] and the first run's true deviation from its reference [m] from `since` on.
+
+    The times count from `since` [s].
+    """
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]

@@ -117,10 +117,10 @@ class CycleComparison:
 
     @property
     def by_asymmetry(self) -> list[tuple[Share, float]]:
-        """Return how often and how slowly cycles swing, by the asymmetry of friction (`BINS`).
+        """Return how often and how slowly cycles swing, for each range of asymmetry in `BINS`.
 
-        All rails with random friction count. The first value is the fraction that still swings when the run ends, the
-        second the median of the periods over that of the even rail.
+        All rails with random friction count. A pair has the fraction of runs that still swing at the end, and the
+        median of their periods over that of the even rail (NaN: none swings).
         """
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):
@@ -256,7 +256,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
 
 
 def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
-    """Return cycles with one property changed, by the name of the property."""
+    """Return the cycle on an even rail after one change of the stage, by name of the change."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}

@@ -47,7 +47,7 @@ class StrokeCrossover:
     def share(self) -> np.ndarray:
         """Return the fraction of rails on which peaks are counted, shape (strokes, crossovers).
 
-        It is NaN where all runs failed.
+        The fraction is NaN where all runs failed.
         """
         done = ~self.runs.failed
         count = done.sum(axis=2)
@@ -56,7 +56,7 @@ class StrokeCrossover:
 
     @property
     def nearest(self) -> int:
-        """Return the index of the crossover nearest to the stage's own."""
+        """Return the index of the crossover on the grid that is nearest to the stage's own."""
         return int(np.argmin(abs(self.crossovers - self.frequency)))
 
     @property

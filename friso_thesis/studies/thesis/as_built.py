@@ -137,7 +137,7 @@ def rig_with_drive(stage: Stage) -> Stage:
 
 
 def moves(stage: Stage) -> MovesOnRails:
-    """Run the moves of Fig. 24 and 25 on several rails."""
+    """Run the moves of Fig. 24 and 25 with the rig's real drive on several rails."""
     machine = _prescribed(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
     seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
@@ -153,7 +153,7 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Run moves over strokes and crossovers on all rails (Fig. 26)."""
+    """Run moves with the rig's real drive over strokes and crossovers on all rails (Fig. 26)."""
     seeds = 1.0 + np.arange(float(RAILS))
     return stroke_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
@@ -178,7 +178,7 @@ _FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("
 
 
 def standstill(stage: Stage) -> InPosition:
-    """Run the rig at a standstill under each disturbance (Fig. 28)."""
+    """Run the rig with its real drive at a standstill under each disturbance (Fig. 28)."""
     return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
 
 
@@ -217,11 +217,11 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 class RigLoops:
     """Open loops and masses of the rig, as measured with its real drive.
 
-    `locked` has the loops tuned to several crossovers. `free` is the loop with a free joint at the lowest of them, and
-    `plant` is its plant. With the joint free, the crossovers `settings` [Hz], shape (n,), were tried; `stable` is true
-    where the loop was.
+    `locked` has the loops of the locked joint, tuned to several crossovers. `free` is the loop of the free joint at the
+    lowest of them, and `plant` its plant. With the joint free, the crossovers `settings` [Hz], shape (n,), were tried;
+    `stable`, shape (n,), is true where the loop was stable.
 
-    `apparent` are masses [kg] that the rig seems to have, shape (2, ratios), locked and free. Its motor then gives
+    `apparent`, shape (2, ratios), are masses [kg] that the rig seems to have, locked and free. Its motor then gives
     `RATIOS` of the force that is assumed.
     """
 

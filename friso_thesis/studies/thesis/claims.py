@@ -103,20 +103,20 @@ class Finding:
 
     @property
     def stated(self) -> tuple[Part, ...]:
-        """Return the parts that say something about the thesis."""
+        """Return the criteria that say something about the thesis, without friso's tests of itself."""
         return tuple(part for part in self.parts if not part.self_test)
 
     @property
     def pattern(self) -> tuple[bool | None, ...]:
-        """Return which of the stated parts hold; None for those that are undecided."""
+        """Return for each criterion about the thesis whether it is met; None if it is undecided."""
         return tuple(None if part.undecided else part.holds for part in self.stated)
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement that follows from the parts.
+        """Return the judgement that follows from the criteria of the claim.
 
-        It is "holds" if all decided parts are met, "differs" if none is, else "holds in part"; "cannot be decided" if
-        no part is decided.
+        The judgement is "holds" if all decided criteria are met, "differs" if none is, else "holds in part"; "cannot be
+        decided" if no criterion is decided.
         """
         decided = [holds for holds in self.pattern if holds is not None]
         if not decided:
@@ -125,7 +125,7 @@ class Finding:
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:
-    """Return a number with its unit; for NaN, say that there is none."""
+    """Return a number with its unit as text; "none" if it is NaN or infinite."""
     return f"{value:{form}} {unit}".rstrip() if math.isfinite(value) else "none"
 
 
@@ -175,9 +175,9 @@ Judge = Callable[[Evidence], Finding]
 class Registered:
     """A judge, which is a function that judges a claim, and what it needs.
 
-    It has the figure (or equation) that shows its evidence. It also has the names of the maps, responses, parts of the
-    linear analysis and experiments that it needs. `undrawn` names assumptions that decide on the claim but are in no
-    draw of open values. A judge `of_runs` is about runs alone, so that attractors do not matter.
+    `figure` names the figure (or equation) that shows its evidence. `needs` has the names of maps, responses, parts of
+    the linear analysis and experiments. `undrawn` names assumptions that decide on the claim but are in no draw of open
+    values. If `of_runs` is true, the claim is about runs alone, so that attractors do not matter.
     """
 
     judge: Judge
@@ -195,8 +195,9 @@ def judges(
 ) -> Callable[[Judge], Judge]:
     """Register the decorated function as judge of a claim.
 
-    `undrawn` are assumed values that decide on the claim but are in no draw of open values. A claim `of_runs` is not
-    judged by attractors. Raises ValueError for an unknown or taken claim.
+    `figure` shows its evidence, and `needs` names the evidence. `undrawn` are assumed values that decide on the claim
+    but are in no draw of open values. A claim `of_runs` is not judged by attractors. Raises ValueError for an unknown
+    or taken claim.
     """
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
@@ -213,7 +214,7 @@ def judges(
 def registered() -> Mapping[str, Registered]:
     """Return the judges, which are functions that judge a claim, by the name of the claim.
 
-    They are declared in `friso_thesis.studies.thesis.judges`, or were registered later.
+    Judges are declared in `friso_thesis.studies.thesis.judges`, or were registered later.
     """
     import friso_thesis.studies.thesis.judges  # noqa: F401 (registers them)
 

@@ -146,7 +146,7 @@ def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
 
 
 def every(values: int) -> int:
-    """Return the step between surveyed values on an axis with `values` values."""
+    """Return the step between surveyed values on a map axis that has `values` values."""
     return max(1, round((values - 1) / (SURVEYED - 1)))
 
 

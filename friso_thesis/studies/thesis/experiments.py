@@ -225,7 +225,7 @@ def _experiment(name: str, stage_file: str) -> Any:
 
 
 def locked_line(stage: Stage) -> LockedLine:
-    """Simulate the locked rig's response to sines of one force, at places of other friction."""
+    """Simulate the locked rig's response to sines of force, with friction as at several places."""
     places = [
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]

@@ -40,7 +40,7 @@ class ConclusionByLaw:
         return self.findings[law].judgement
 
     def turned(self, law: str) -> tuple[str, ...]:
-        """Return the numbers of the parts that hold under just one of two laws.
+        """Return the numbers, as texts, of the criteria that hold under just one of two laws.
 
         The laws are the given one and the thesis's own.
         """
@@ -51,9 +51,9 @@ class ConclusionByLaw:
 
 @dataclass(frozen=True)
 class ConclusionsByLaw:
-    """Conclusions under each law that keeps the measured friction, the thesis's own first.
+    """Conclusions under each law that can match measured friction, the thesis's own law first.
 
-    `left_out` lists the other laws, with what they do not keep.
+    `left_out` lists the other laws, each with the kinds of measured friction that it cannot match.
     """
 
     laws: tuple[str, ...]
@@ -106,7 +106,7 @@ def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response],
 
 
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
-    """Return the rig converted to a law, as far from the rig as measurements allow.
+    """Return the rig converted to a law, in the variant that differs most from the rig itself.
 
     `conversion` is the converted rig. If measurements hardly tell it from the rig, values that they leave open are
     moved to the upper end of what they allow.

@@ -39,10 +39,10 @@ def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
 
 
 def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
-    """Return, for each column of `moving`, (n, columns), where runs stop moving.
+    """Return, for each column of `moving`, (n, columns), the value at which runs stop moving.
 
-    `values` ascend, shape (n,). The limit lies between the last value that keeps moving and the next. It is the value
-    at which the `size` of the swings, interpolated in its logarithm, is 1. The limit is halfway between both values if
+    `values` ascend, shape (n,). This limit lies between the last value with which a run keeps moving and the next:
+    where the `size` of the swings, interpolated in its logarithm, is 1. The limit is halfway between both values if
     sizes are unknown, lie on one side of 1, or nothing is left of the swing beyond. A limit outside the range becomes
     the end of the range.
     """

@@ -60,7 +60,7 @@ class Separation:
 
 @dataclass(frozen=True)
 class MetPart:
-    """For how many random choices of the open values a part of a claim is met, and the fraction."""
+    """In how many random choices of the open values a criterion is met, and the fraction."""
 
     met: int
     share: Share
@@ -105,7 +105,7 @@ class ClaimInSpace:
 
 @dataclass(frozen=True)
 class PrintedNumber:
-    """A number that the thesis prints for a claim, its criterion, and what friso finds for it."""
+    """A number that the thesis prints for a criterion of a claim, and the one that friso finds."""
 
     claim: str
     criterion: str
@@ -194,7 +194,7 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
 
 
 def counted(entry: Registered, base: Evidence) -> Finding:
-    """Return the finding of a judge, with hunting judged by the thesis's peak count."""
+    """Return a judge's finding by the thesis's criterion: a stage hunts if peaks are counted."""
     return entry.judge(by_way(base, by_peak_count))
 
 
@@ -247,9 +247,9 @@ def _in_space(
 
 
 def _met(column: Sequence[bool | None], count: int) -> MetPart:
-    """Return in how many of `count` random choices of the open values a part of a claim is met.
+    """Return in how many of `count` random choices of the open values a criterion is met.
 
-    In those that `column` lacks, or has as None, it is undecided.
+    `column` says for each choice whether it is met. Choices that `column` lacks, or has as None, are undecided.
     """
     flags = np.array([holds for holds in column if holds is not None], bool)
     return MetPart(int(flags.sum()), _share(flags, count))
@@ -314,7 +314,7 @@ def _fit(
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:
-    """Return the printed numbers of a claim, with the numbers found."""
+    """Return the numbers that the thesis prints for a claim, beside those of a finding."""
     return [
         PrintedNumber(claim, part.criterion, part.printed, part.read)
         for part in finding.parts

@@ -191,7 +191,7 @@ def _survey_work(study: ThesisStudy) -> int:
 
 
 def _left_out(claim: Claim, chosen: Mapping[str, ThesisStudy]) -> ClaimVerdict:
-    """Return the verdict on a claim that is not judged in this run."""
+    """Return the verdict "not covered" on a claim that is not judged here, with the reason."""
     entry = registered().get(claim.id)
     if entry is None:
         return not_covered(claim, "no judge decides on it")
@@ -266,7 +266,7 @@ def _needs(
 
 
 def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tally: Tally) -> dict[float, xr.Dataset]:
-    """Return the map of Fig. 14B at the thesis's tolerance and a tight one."""
+    """Return the map of Fig. 14B at the thesis's tolerance and at a tight one, by tolerance."""
     maps = {}
     for study in studies.values():
         for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():

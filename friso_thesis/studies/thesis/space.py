@@ -49,18 +49,18 @@ class OpenValue:
         return self.low + share * (self.high - self.low)
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Tell whether changing the value may change the study's map."""
+        """Tell whether changing the value may change a study's map: the study must not set its keys."""
         return self.decides(study.sets, bool(study.changes.get("joint.locked")))
 
     def decides(self, fixed: Set[str], locked: bool) -> bool:
         """Tell whether the value matters if the keys `fixed` are set by something else.
 
-        A locked joint has no damping of its own.
+        It does unless all its keys are fixed. With a `locked` joint, the joint's own damping does not matter either.
         """
         return not self.keys <= (fixed | _OPEN_JOINT_KEYS if locked else fixed)
 
     def touches_part(self, need: PartNeeded) -> bool:
-        """Tell whether changing the value may change that part of the analysis or that experiment."""
+        """Tell whether the value may change a part of the linear analysis, or an experiment."""
         return self.decides({key for key in self.keys if key.startswith(need.outside)}, need.locked)
 
 

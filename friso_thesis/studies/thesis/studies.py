@@ -17,9 +17,9 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class AxisSpan:
-    """Range of one axis: the stage-file key or free name, its ends [unit], and its scale.
+    """Range of one axis: its key in the stage file or a free name, its ends [unit], its scale.
 
-    The scale is logarithmic or linear.
+    If `log` is true, the scale is logarithmic, otherwise linear.
     """
 
     key: str
@@ -59,7 +59,7 @@ class ThesisStudy:
 
     @property
     def of_motion(self) -> bool:
-        """Tell whether its axes belong to the motion alone, on which attractors do not depend."""
+        """Tell whether the study's axes belong to the motion, on which attractors do not depend."""
         return all(span.key.startswith("motion.") for span in self.spans)
 
     def axes(self, points: int) -> dict[str, str]:

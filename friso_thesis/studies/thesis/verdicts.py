@@ -60,7 +60,7 @@ class ClaimVerdict:
 
     @property
     def robust(self) -> bool:
-        """Tell whether a claim fails for any plausible choice of what the thesis leaves open.
+        """Tell whether a claim fails for every plausible choice of what the thesis leaves open.
 
         The claim must hold in no draw of the open values, and at most in the fraction `ROBUST` by the 95 % interval. No
         assumption outside the draws may decide on it.
@@ -120,7 +120,10 @@ def draws_text(share: Share, count: int, draws: int) -> str:
 
 
 def _listed(space: ClaimInSpace) -> str:
-    """Return the values on which a claim depends, the most decisive first."""
+    """Return the values on which a claim depends, the most decisive first, with the direction.
+
+    The direction tells whether the claim holds with more or with less of the value.
+    """
     either = {value.name: value for value in OPEN}
     words = []
     for item in space.hangs_on:
@@ -164,7 +167,7 @@ def verdict(
 
 
 def _change(first: Finding, second: Finding) -> str:
-    """Say how a second finding judges the claim, with the number in each part that it turns."""
+    """Say how a second finding judges the claim, with the numbers of the criteria that it turns."""
     pairs = zip(first.stated, second.stated, first.pattern, second.pattern, strict=True)
     numbers = "; ".join(after.number for _, after, was, becomes in pairs if was != becomes)
     return f"the claim is judged: {second.judgement} ({numbers})"

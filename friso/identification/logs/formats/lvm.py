@@ -52,13 +52,13 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
 
 
 def _above(segment: dict[str, Any], key: str, column: int) -> Any:
-    """Return a header's value for a column; None if the header has no such key."""
+    """Return the value of a header's key above a column; None if the header lacks the key."""
     row = segment.get(key, [])
     return row[column] if 0 <= column < len(row) else None
 
 
 def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
-    """Return `n` instants from `start` on, `step` apart; None without a step."""
+    """Return `n` instants [s] from `start` on; None without a start or a positive `step`."""
     return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
 
 

@@ -56,7 +56,10 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
 
 
 def _walk(node: Any, name: str, walk: _Contents) -> None:
-    """Collect the channels, numbers and objects below a node (dict, list, array, str)."""
+    """Collect the channels, numbers and objects below a node (dict, list, array, str) in `walk`.
+
+    `name` is the node's name in the file.
+    """
     if isinstance(node, dict) and OBJECT in node:
         walk.objects.append(f"{name} ({node[OBJECT]})")
     elif (

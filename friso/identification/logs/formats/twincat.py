@@ -142,7 +142,7 @@ def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.nd
 
 
 def _source(column: int, info: dict[str, str]) -> str:
-    """Describe a channel's place in the file."""
+    """Describe a channel's place in the file: its column, symbol and data type."""
     texts = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
     return ", ".join([f"column {column + 1}", *texts])
 

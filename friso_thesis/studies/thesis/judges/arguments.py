@@ -79,9 +79,10 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
 
 @lru_cache(maxsize=256)
 def _margins(stage_file: str) -> dict[float, float]:
-    """Return the least modulus margin by the mass [kg] that the controller assumes.
+    """Return the least modulus margin of a rig, by the mass [kg] that its controller assumes.
 
-    The limit cases count, and all states stuck under a bias force. The margin is 0 if one of them is unstable.
+    Margins in the limit cases count, and those of all states stuck under a bias force. The margin is 0 if one of them
+    is unstable.
     """
     flat = {**loads(stage_file).flat(), "joint.locked": False}
     whole = flat["masses.cart"] + flat["masses.stage"]
@@ -138,7 +139,7 @@ def close_to_ten_g(evidence: Evidence) -> Finding:
 def why_mass_helps(evidence: Evidence) -> Finding:
     """Judge why mass helps, by the first slip across the reference after the return move.
 
-    Both masses have the same crossover.
+    A light and a heavy stage with the same crossover are compared.
     """
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
@@ -215,8 +216,8 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     """Judge whether counted peaks mean a cycle.
 
-    By the count, it is the fraction of cells with peaks whose run still swings at its end. By attraction, it is the
-    fraction of decided cells that a cycle attracts, for every map.
+    By the peak count, the fraction of cells with peaks decides whose run still swings at its end. By attraction, it is
+    the fraction of decided cells with peaks whose stage has an attracting cycle. The cells of all maps count together.
     """
     words = reading()
     rows, counted, lasting = [], 0, 0

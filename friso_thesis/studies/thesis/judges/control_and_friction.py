@@ -83,7 +83,7 @@ def smallest_gap(evidence: Evidence) -> float:
 
 @judges("F12B", figure="12B", needs=("control",))
 def control_is_no_cure(evidence: Evidence) -> Finding:
-    """Judge how the count depends on alpha and beta, and whether either brings all runs to rest."""
+    """Judge how alpha and beta change the peak count, and whether either ends all hunting."""
     words = reading()
     axes = (ALPHA, BETA)
     alpha, beta, moving, valid = verdict_table(evidence.maps["control"], *axes)

@@ -30,7 +30,10 @@ LAW_OF_RULES = K_P * (1 + TAU_Z / TAU_I + 1 / (TAU_I * S) + TAU_Z * S) / (TAU_P 
 
 
 def law_of_gains(gains: tuple[sp.Expr, sp.Expr, sp.Expr]) -> sp.Expr:
-    """Return Eq. 6 for gains K_p, K_i and K_d, with the filter of Eq. 7."""
+    """Return the transfer function of the PID controller of Eq. 6, from gains K_p, K_i and K_d.
+
+    The derivative term is filtered with the time constant of Eq. 7.
+    """
     proportional, integral, derivative = gains
     return proportional + integral / S + derivative * S / (S * TAU_P + 1)
 
@@ -50,7 +53,10 @@ def two_forms_of_the_controller(evidence: Evidence) -> Finding:
 
 
 def judged_forms(gains: tuple[sp.Expr, sp.Expr, sp.Expr], tuned: dict[str, float]) -> Finding:
-    """Judge the gains of Eq. 6, and the numbers of Eq. 8 for a rig."""
+    """Judge whether Eq. 6 with some gains equals Eq. 7, and whether the gains are positive.
+
+    `gains` are K_p, K_i and K_d as formulas. `tuned` has the numbers that Eq. 8 gives for a rig, by symbol.
+    """
     values = [float(gain.subs({symbol: tuned[str(symbol)] for symbol in gain.free_symbols})) for gain in gains]
     plain = as_gains(**tuned)
     kp, ki, kd = values
@@ -111,9 +117,10 @@ def crossover_beside_the_first_mode(evidence: Evidence) -> Finding:
 
 
 def judged_crossovers(margins: dict[float, float], first: float, force: float, settling: float) -> Finding:
-    """Judge margins over the crossover, and its rank correlation with force and settling time.
+    """Judge where the crossover may lie beside the first eigenfrequency `first` [Hz].
 
-    Crossovers are in `first` eigenfrequencies [Hz].
+    `margins` has the least modulus margin by crossover, in first eigenfrequencies. `force` and `settling` are the rank
+    correlations of force and settling time with the crossover.
     """
     words, far = reading(), JudgeSettings.current().far_crossover_factor
     near = {ratio: margin for ratio, margin in margins.items() if 1 / far < ratio < far}

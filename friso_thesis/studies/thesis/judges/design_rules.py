@@ -78,9 +78,10 @@ def _needed_ratio(stage_file: str) -> float:
 
 @lru_cache(maxsize=256)
 def _margins_at_the_top(stage_file: str) -> dict[str, float]:
-    """Return the least modulus margin at the highest crossover, joint locked and free.
+    """Return the least modulus margin at the highest crossover of the thesis, locked and free.
 
-    The limit cases count, and all states stuck under a bias force. The margin is 0 if one of them is unstable.
+    Margins in the limit cases count, and those of all states stuck under a bias force. The margin is 0 if one of them
+    is unstable.
     """
     flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
@@ -120,7 +121,7 @@ def _strokes_needed(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _stroke(evidence: Evidence) -> Part:
-    """Judge the stroke needed with the joint as built."""
+    """Judge whether the thesis's stroke is enough for rest at 8 Hz with the joint as built."""
     stiffness, by_stiffness = _strokes_needed(evidence)
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(by_stiffness[nearest])
@@ -133,7 +134,7 @@ def _stroke(evidence: Evidence) -> Part:
 
 
 def _softer_needs_less_stroke(evidence: Evidence) -> Part:
-    """Judge how the stroke needed depends on the stiffness."""
+    """Judge whether a softer joint needs less stroke for rest at 8 Hz."""
     words = reading()
     stiffness, needed = _strokes_needed(evidence)
     rises = trend(stiffness, needed)
@@ -170,7 +171,7 @@ def _locked_edge() -> str:
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
-    """Judge from which crossover the isolated and the locked rig come to rest."""
+    """Judge from which crossover the isolated rig, and from which the locked rig, comes to rest."""
     words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")

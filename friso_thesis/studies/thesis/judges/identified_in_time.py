@@ -38,12 +38,12 @@ _UNIFORM = "uniform friction along the rail, no noise"
 
 @judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
-    """Judge the joint's stiffness from position steps of the rig with its cart fixed."""
+    """Judge whether position steps with the cart fixed give the joint's stiffness."""
     return judged_steps(evidence.experiments.joint_steps)
 
 
 def judged_steps(steps: JointSteps) -> Finding:
-    """Judge the joint's stiffness from simulated position steps."""
+    """Judge whether simulated position steps give the joint's true stiffness, and the thesis's."""
     words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
@@ -75,12 +75,15 @@ def judged_steps(steps: JointSteps) -> Finding:
 
 @judges("F20", figure="20", needs=(SLIPS,), undrawn="the static friction, which is entered")
 def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
-    """Judge the static friction from stick-slip with the joint free, at several speeds."""
+    """Judge whether stick-slip at several speeds, joint free, gives the static friction."""
     return judged_slips(evidence.experiments.slow_motion)
 
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
-    """Judge static friction from simulated slow motion, in which the cart sticks and slips."""
+    """Judge whether simulated stick-slip gives the true static friction, and the thesis's peaks.
+
+    `runs` are slow motions at several speeds.
+    """
     slips = sum(len(run.result.forces) for run in runs)
     forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
@@ -115,7 +118,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
 
 
 def _spikes(run: SlowMotion) -> bool:
-    """Tell whether the velocity of the cart spikes after every peak.
+    """Tell whether the cart's velocity spikes shortly after every peak of the deflection.
 
     A spike is more than half of the usual one.
     """
@@ -126,7 +129,10 @@ def _spikes(run: SlowMotion) -> bool:
 
 @judges("F21", figure="21", needs=(SPEEDY,), undrawn=RAIL)
 def force_at_constant_speed(evidence: Evidence) -> Finding:
-    """Judge the force of passes at constant speed, with the joint free (Sec. 4.2.3) and locked."""
+    """Judge whether the force oscillates in passes at constant speed, joint free and locked.
+
+    Sec. 4.2.3 claims this for the free joint.
+    """
     return judged_speeds(*evidence.experiments.constant_speed)
 
 
@@ -145,7 +151,11 @@ def _swing_text(share: float) -> str:
 
 
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
-    """Judge the force of passes at constant speed with the real drive, joint free and locked."""
+    """Judge whether the force oscillates in simulated passes at constant speed, and by position.
+
+    Passes are with the real drive, joint free and locked. Also judge that dynamic friction cannot be determined from
+    them.
+    """
     words = reading()
     named = {"free": free, "locked": locked}
     swings = {name: force_swings(runs) for name, runs in named.items()}

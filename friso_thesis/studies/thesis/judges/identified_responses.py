@@ -30,14 +30,17 @@ FIRST, _PARASITIC = 11.0, 300.0
 
 @judges("F17", figure="17", needs=(LINE, BUILT))
 def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
-    """Judge the mass line with friction at several places."""
+    """Judge the locked rig's mass line and its scatter over places with different friction."""
     flat = evidence.rig.flat()
     line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
     return Finding((*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0]))))
 
 
 def judged_line(line: LockedLine, moved: float) -> Finding:
-    """Judge the simulated responses of a rig with the moving mass `moved` [kg]."""
+    """Judge how far up the locked rig follows a mass line, which mass it shows, and its scatter.
+
+    `line` has the simulated responses at several places; `moved` [kg] is the mass that moves.
+    """
     words = reading()
     rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)
@@ -79,9 +82,9 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
 
 @judges("F18", figure="18", needs=(PLANT, BUILT))
 def response_of_the_free_joint(evidence: Evidence) -> Finding:
-    """Judge modes and mass line with the joint free, and a wrong motor constant.
+    """Judge whether modes and mass line with the joint free are as the thesis measured them.
 
-    The question is whether one error of the constant explains both masses that the thesis identified.
+    A further question is whether one error of the motor constant explains both masses that the thesis identified.
     """
     words = reading()
     plants = evidence.analysis.plants

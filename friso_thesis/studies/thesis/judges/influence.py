@@ -37,7 +37,7 @@ _NAMES: Mapping[str, str] = MappingProxyType(
 
 @judges("S33", figure="Sec. 3.3, influence")
 def ranks_of_influence(evidence: Evidence) -> Finding:
-    """Judge how well each parameter of Table 3 separates stages that hunt from others."""
+    """Judge which parameters of Table 3 separate stages that hunt from others best."""
     return judged_ranks(*influences(evidence.rig.to_toml()))
 
 
@@ -82,7 +82,10 @@ def _rank_biserial(values: np.ndarray, hunts: np.ndarray) -> float:
 
 
 def judged_ranks(locked: Mapping[str, float], free: Mapping[str, float]) -> Finding:
-    """Judge the correlations of all parameters, with the joint locked and free."""
+    """Judge whether the parameters that the thesis names separate hunting stages best.
+
+    `locked` and `free` have the rank-biserial correlation by parameter, for the two states of the joint.
+    """
     orders = {name: sorted(of, key=lambda key: -abs(of[key])) for name, of in (("locked", locked), ("free", free))}
     rows = tuple(
         (name, str(place), key, f"{of[key]:+.2f}")

@@ -61,14 +61,14 @@ def judged_shortening(leaves: Evaluation) -> Finding:
 
 @judges("S341W", figure="Sec. 3.4.1, width and length")
 def width_against_length(evidence: Evidence) -> Finding:
-    """Judge the stiffnesses of leaves that are wider, and of leaves that are longer."""
+    """Judge what wider leaves, and longer leaves, change in the stiffness of drive and supports."""
     return judged_dimensions(*(_ratios(name) for name in ("width", "length")))
 
 
 def _ratios(dimension: str) -> tuple[float, float, float]:
     """Return by which factors a larger `dimension` of the leaves changes three stiffnesses.
 
-    They are those of the drive, along the leaves, and along their width.
+    The stiffnesses are those of the drive, along the leaves, and along their width.
     """
     own, other = evaluated(), evaluated(dimension, JudgeSettings.current().leaf_change_factor)
     drive, along, across = (float(getattr(other, name)[0] / getattr(own, name)[0]) for name in _STIFFNESSES)

@@ -34,7 +34,7 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
-    """Evaluate the thesis's leaves for all values that it leaves open."""
+    """Evaluate the thesis's leaf springs for all combinations of values that it leaves open."""
     return tuple(beams(mechanism(*variant), STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 
@@ -96,7 +96,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
-    """Judge the first mode other than the drive mode, over the parameters left open."""
+    """Judge the frequency of the first mode other than the drive mode, for all values left open."""
     words = reading()
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     visible = np.array(

@@ -24,7 +24,7 @@ def four_limit_cases(evidence: Evidence) -> Finding:
 
 
 def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
-    """Return the table of limit cases with their modes and mass lines."""
+    """Return a table with modes and mass line of the plant in each limit case."""
     rows = []
     for name in (*_FREE, *_TOUCHED):
         case = plants[name]

@@ -26,9 +26,9 @@ _CROSSES = 20.0
 
 @judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
 def stable_at_every_speed(evidence: Evidence) -> Finding:
-    """Judge stability over the speed of the cart, and the crossover by the design method.
+    """Judge whether the loop is stable at every speed of the cart.
 
-    The finding also says how speed changes the loop.
+    Also judge how speed changes the loop, and up to which crossover it may be tuned by the design method.
     """
     words = reading()
     analysis = evidence.analysis

@@ -11,7 +11,7 @@ from friso_thesis.studies.thesis.reading import reading
 
 @judges("F5", figure="5", needs=("locked",))
 def locked_rig_hunts(evidence: Evidence) -> Finding:
-    """Judge counted peaks, period and amplitude of the locked rig."""
+    """Judge whether peaks, period and amplitude of the locked rig are as in the thesis."""
     words = reading()
     cell = evidence.responses["locked"].cell
     peaks, period, amplitude = int(cell["count"]), float(cell["period"]), float(cell["peak_to_peak"]) / 2

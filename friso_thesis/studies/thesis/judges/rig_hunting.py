@@ -158,7 +158,10 @@ def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
 
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
-    """Judge the cycle on an even rail, as the thesis simulates, and those on varied rails."""
+    """Judge whether the cycle on an even rail is as the thesis simulates it.
+
+    Also judge whether cycles on varied rails are slower, lopsided and irregular, as measured.
+    """
     words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings

@@ -1,4 +1,4 @@
-"""Add what the rig with its real drive shows, measured as in Fig. 17, 18, 22, 23."""
+"""Judge by the rig with its real drive, in claims on responses (Fig. 17, 18, 22, 23)."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ RAIL = "how friction varies along the rail, which rails these are, the drive's d
 
 
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
-    """Return the parts that the rig with its real drive adds; none if it was not run."""
+    """Return the criteria that `parts` judges by the rig with its real drive; () without it."""
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
 
 
 def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
-    """Judge where the open loops of the locked rig cross 0 dB."""
+    """Judge where the open loops of the locked rig cross 0 dB, as measured with its real drive."""
     return _crossings(loops), _further(loops)
 
 
@@ -53,7 +53,7 @@ def _crossings(loops: RigLoops) -> Part:
 
 
 def _further(loops: RigLoops) -> Part:
-    """Judge whether the loop tuned to the highest crossover crosses 0 dB again."""
+    """Judge whether the locked loop tuned to the highest crossover crosses 0 dB a second time."""
     words = reading()
     last = loops.locked[-1]
     above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
@@ -80,7 +80,7 @@ def _peak(loop: MeasuredLoop, low: float) -> tuple[float, float]:
 
 
 def measured_free(loops: RigLoops) -> tuple[Part, Part]:
-    """Judge where the open loop of the free joint crosses 0 dB, and its highest stable tuning."""
+    """Judge where the free joint's open loop crosses 0 dB, and up to which tuning it is stable."""
     crossed = max((crossing.value for crossing in loops.free.crossings), default=np.nan)
     highest = highest_stable(loops.settings, loops.stable)
     return (

@@ -68,7 +68,10 @@ class Sticking:
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
-    """Judge for how long the stage sticks at both gaps, and the integral's part in the force."""
+    """Judge whether the stage sticks longer at the narrow friction gap than at the wide one.
+
+    Also judge whether the integral action has a larger fraction of the force at break-away.
+    """
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
     why = (
         ""

@@ -59,7 +59,7 @@ CASES: Mapping[str, Mapping[str, Any]] = MappingProxyType(_cases())
 
 @judges("S323", figure="Sec. 3.2.3, solver")
 def solver_and_largest_step(evidence: Evidence) -> Finding:
-    """Compare runs by both solvers: whether they hunt, how often, and by how much."""
+    """Judge whether runs by the thesis's solver and by friso hunt alike, as often and as far."""
     kept = findings_on_file()[EVIDENCE].values
     return judged_runs({name: _kept(kept, name) for name in CASES}, own_runs(TIGHT), own_runs(RTOL))
 
@@ -92,7 +92,11 @@ def _counted(cell: xr.Dataset) -> Counted:
 
 
 def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
-    """Judge runs by name: by ode23s, and by friso at the tight tolerance and at the thesis's."""
+    """Judge whether ode23s and friso count equal peaks and swings in the same runs.
+
+    All arguments have runs by name: `theirs` by ode23s, `tight` by friso at a tight tolerance, and `loose` by friso at
+    the thesis's.
+    """
     words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]
@@ -139,7 +143,10 @@ def other_solvers(evidence: Evidence) -> Finding:
 
 
 def judged_solvers(values: Mapping[str, float]) -> Finding:
-    """Judge runs by three solvers, named as in `benchmarks.ode23s.other_solvers`."""
+    """Judge the cost and the results of ode15s and ode45 against those of ode23s.
+
+    `values` has steps, evaluations, peaks and swing of each run, named as in `benchmarks.ode23s.other_solvers`.
+    """
     words = reading()
     cost = {name: {joint: values[f"{joint}_{name}_evaluations"] for joint in ("locked", "free")} for name in _SOLVERS}
     cheaper = min(cost["ode15s"][joint] / cost["ode23s"][joint] for joint in ("locked", "free"))

@@ -67,9 +67,9 @@ def _against(first: float, second: float, unit: str, names: tuple[str, str]) -> 
 
 @judges("S41M", figure="Sec. 4.1, mass step by step", needs=(LIGHT, HEAVIEST))
 def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
-    """Judge how fast the integral action changes with a light and a heavy mass.
+    """Judge whether the integral action builds up more slowly with a heavier mass.
 
-    How the heavy mass ends is judged as well.
+    Also judge whether no peaks are counted with the heavy mass.
     """
     light, heavy = (cycle_of(evidence.responses[name]) for name in (LIGHT, HEAVIEST))
     counted = int(evidence.responses[HEAVIEST].cell["count"])
@@ -93,7 +93,10 @@ def heavier_mass_step_by_step(evidence: Evidence) -> Finding:
 
 @judges("S41G", figure="Sec. 4.1, gap and overshoot", needs=(WIDE, NARROW))
 def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
-    """Judge overshoot and build-up of the integral at both gaps."""
+    """Judge whether a wider friction gap gives more overshoot and faster build-up.
+
+    The gap is static minus Coulomb friction; two gaps are compared. What builds up is the integral action.
+    """
     wide, narrow = (cycle_of(evidence.responses[name]) for name in (WIDE, NARROW))
     undecided = "" if wide.stick.both and narrow.stick.both else NOTHING_TO_COMPARE
     return Finding(
@@ -118,7 +121,11 @@ def larger_gap_larger_overshoot(evidence: Evidence) -> Finding:
 
 @judges("S41A", figure="Sec. 4.1, alpha and break-away", needs=(LOW_ALPHA, HIGH_ALPHA))
 def larger_alpha_breaks_away_sooner(evidence: Evidence) -> Finding:
-    """Judge for how long the stage sticks at both ends of the range of alpha."""
+    """Judge whether the stage sticks for a shorter time with a larger alpha.
+
+    Both ends of the range of alpha are compared. Also judge whether the integral action then has a smaller fraction of
+    the force at break-away.
+    """
     low, high = (cycle_of(evidence.responses[name]).stick for name in (LOW_ALPHA, HIGH_ALPHA))
     undecided = "" if low.both and high.both else NOTHING_TO_COMPARE
     return Finding(

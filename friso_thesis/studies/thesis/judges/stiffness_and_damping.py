@@ -67,7 +67,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """Judge whether the cells of stroke 0 behave as the locked rig does."""
+    """Judge whether the rig with stroke 0 has as many counted peaks as the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["count"].values
@@ -83,7 +83,10 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """Judge the stroke from which runs rest with a strongly damped limiter, and the amplitude."""
+    """Judge from which stroke runs come to rest with a strongly damped limiter.
+
+    Also judge how this stroke compares with the amplitude of the locked rig.
+    """
     words = reading()
     runs, axes = evidence.maps["isolator-damping"], ("joint.stroke", "joint.limiter_damping")
     stroke, damping, moving, _ = verdict_table(runs, *axes)
@@ -125,9 +128,10 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
 
 
 def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
-    """Say at which longer strokes runs keep moving again, if they do: a stripe of its own.
+    """Say at which strokes runs keep moving although some shorter stroke brings them to rest.
 
-    At some shorter strokes all these runs come to rest. `moving` has the shape (strokes, dampings).
+    `stroke` [m] and `damping` [N s/m] are the axes, and `moving` has the shape (strokes, dampings). The text is "" if
+    there are no such strokes.
     """
     rests = np.maximum.accumulate(~moving, axis=0)  # the first stroke at which they come to rest
     apart = moving & rests

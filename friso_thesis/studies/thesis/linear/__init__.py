@@ -38,9 +38,9 @@ PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locke
 
 @dataclass(frozen=True)
 class PartNeeded:
-    """A part of the analysis that a judge may name.
+    """A part of the linear analysis, or an experiment, that a judge may need.
 
-    `outside` are the tables of the stage file that do not matter for it. `locked` is true if its joint is locked, so
+    `outside` are the tables of the stage file on which it does not depend. `locked` is true if its joint is locked, so
     that the joint's own damping does not matter.
     """
 
@@ -62,11 +62,11 @@ class Linear:
     """A rig as a linear system.
 
     - `plants`: by limit case; "-series" after a name marks the formula that Table 1 prints for a touched limiter.
-    - `springs`: in series.
-    - `free`, `locked`: loops by state of the joint.
-    - `speeds`: 8 Hz loop over the speed of the cart.
-    - `identified`: the loop with the masses that the thesis identified, joint free.
-    - `contact`: loop at 48 Hz with a softer contact, locked.
+    - `springs`: stiffness of joint and bristles, and of both in series.
+    - `free`, `locked`: loops by state of the joint, tuned to several crossovers.
+    - `speeds`: stability of the loop tuned to 8 Hz, over the speed of the cart.
+    - `identified`: margins with the masses that the thesis identified, joint free.
+    - `contact`: the loop tuned to 48 Hz, joint locked by a softer contact.
     """
 
     plants: Mapping[str, LimitCase]

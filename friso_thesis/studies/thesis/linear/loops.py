@@ -96,10 +96,10 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
-    """Return the highest crossover [Hz] up to which the sliding loop crosses 0 dB once.
+    """Return the highest crossover [Hz] up to which the sliding loop crosses 0 dB only once.
 
-    A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if that
-    holds up to the end of the search, and 0 if at no crossover.
+    A free joint's limiter is touched, because the controller is tuned for the whole mass. The result is None if the
+    loop does so up to the end of the search, and 0 if it does at no crossover.
     """
     settings = FrequencySettings.current()
     cases = limit_cases(flat)
@@ -117,9 +117,9 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
-    """Return the crossover [Hz] up to which all limit cases are stable.
+    """Return the highest crossover [Hz] up to which the loop is stable in all limit cases.
 
-    The result is None if they are stable up to the end of the search, and 0 if at no crossover.
+    The result is None if it is stable up to the end of the search, and 0 if it is at no crossover.
     """
     ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
     end = range_end(ranges, flat[CROSSOVER]) or 0.0
@@ -127,5 +127,5 @@ def _highest(flat: Mapping[str, Any]) -> float | None:
 
 
 def _edge(flat: Mapping[str, Any]) -> float:
-    """Return the least delay [s] at which some limit case is unstable."""
+    """Return the least delay [s] that makes the loop unstable in some limit case."""
     return float(np.min([margins(flat, member).delay_margin for member in limit_cases(flat).values()]))

@@ -63,7 +63,7 @@ class LimitCase:
 
 @dataclass(frozen=True)
 class Springs:
-    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the resting plant (`both`)."""
+    """Stiffness [N/m] of the `joint`, the cart's `bristles`, and the plant at 0 Hz (`both`)."""
 
     joint: float
     bristles: float
@@ -71,7 +71,7 @@ class Springs:
 
 
 def springs_of(flat: Mapping[str, Any]) -> Springs:
-    """Return the springs of a stage whose cart is stuck, its limiter free."""
+    """Return the stiffnesses of joint and bristles, and of the plant with the cart stuck."""
     machine = plant(flat, limit_cases(flat)["stuck"]).take((FORCE,), (STAGE,))
     both = float(1 / abs(machine.at(np.zeros(1))[0, 0, 0, 0]))
     bristles = friction_law(flat["friction.model"]).shown(flat).stiffness
@@ -79,9 +79,9 @@ def springs_of(flat: Mapping[str, Any]) -> Springs:
 
 
 def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
-    """Return all limit cases by name.
+    """Return the plant in all limit cases, by name.
 
-    Cases with a touched limiter are also given by the formula of Table 1, with "-series" appended.
+    Cases with a touched limiter are also computed by the formula of Table 1, with "-series" appended to the name.
     """
     cases = limit_cases(flat)
     series = limiter_in_series(flat)
@@ -101,7 +101,10 @@ def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
 
 
 def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
-    """Return at which frequencies [Hz] the plant has peaks, or dips if `sign` is -1."""
+    """Return at which frequencies [Hz] the plant of a limit case peaks, or dips if `sign` is -1.
+
+    `omega` [rad/s] are the frequencies searched.
+    """
 
     def height(at: np.ndarray) -> np.ndarray:
         return sign * np.log(np.abs(plants(flat, member, at)[0]))

@@ -31,10 +31,11 @@ CROSSOVERS = 25
 class Speeds:
     """Stability of the loop with the cart at prescribed speeds [m/s].
 
-    - `unstable`: ranges of speed in which it is unstable with the limiter free; `unstable_touched`: with it touched.
+    - `unstable`: ranges of speed in which the loop is unstable with the limiter free; `unstable_touched`: with it
+      touched.
     - `undeflected`: these ranges with bristles that the motion has not deflected yet (z = 0), where a linearisation
       about an initial speed begins.
-    - `incurable`: whether, in the middle of the range, no faster controller up to 10 kHz is stable.
+    - `incurable`: whether no faster controller, up to 10 kHz, is stable in the middle of at least one unstable range.
     - `slow`, `fast`: ratio of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth
       and at ten times the crossover.
     """
@@ -74,7 +75,7 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
-    """Tell whether, in the middle of some range, no faster controller is stable."""
+    """Tell whether no faster controller is stable in the middle of at least one unstable range."""
     settings = FrequencySettings.current()
     crossover = np.geomspace(flat[CROSSOVER], settings.highest_crossover, CROSSOVERS)
     many = faster(flat, crossover / flat[CROSSOVER])

@@ -32,8 +32,9 @@ LITTLE = "1 N*s/m"
 class Contact:
     """A contact of cart and stage so soft that its mode lies at a further crossing of 0 dB.
 
-    That crossing was measured. The contact has a `stiffness` [N/m]. `margins` are those of the sliding rig's loop,
-    locked and tuned to the highest crossover, with the rig's limiter damping; `undamped` are those with little damping.
+    The thesis measured this crossing with the joint locked. The contact has a `stiffness` [N/m]. `margins` are those of
+    the loop with the cart sliding, tuned to the highest crossover, with the rig's limiter damping; `undamped` are those
+    with little damping.
     """
 
     stiffness: float
