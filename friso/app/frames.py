@@ -44,7 +44,7 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
 
 
 class _Arrays:
-    """The arrays of a frame, in sequence."""
+    """The numbers of a frame's arrays in binary, one array behind the other."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []

@@ -188,9 +188,9 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where the curve with this index runs, and how it ends there.
+    """Say from which point to which a curve of a plane runs, and how it ends there.
 
-    Values have `digits` digits.
+    `number` is the index of the curve. Values have `digits` digits.
     """
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
@@ -260,10 +260,10 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
-    """Say in which ranges between the values tried a cycle attracts as well.
+    """Say in which ranges, between neighbouring values tried, a cycle attracts as well.
 
-    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
-    errors [SI]. Values that belong to no range are listed by themselves. The list is empty without `turns`.
+    `turns` are the values [SI] at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds
+    their errors [SI]. Values that bound no such range are listed by themselves. The list is empty without `turns`.
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
@@ -346,7 +346,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """Say how many points a curve has, and how large their errors are."""
+    """Say how many points a curve has, and how large their errors are at most."""
     finite = line.error[np.isfinite(line.error).all(axis=1)]
     errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
     unknown = len(line.error) - len(finite)

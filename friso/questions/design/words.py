@@ -65,7 +65,7 @@ def isolator(fitted: LeavesAndCrossover, crossover: float) -> str:
 
 
 def headline(design: Design) -> list[tuple[str, str]]:
-    """Return the verdicts with their colours: isolator or not, which one, and whether it holds."""
+    """Return the verdicts with their colours: is an isolator needed, which one, do moves settle."""
     return [
         (ORANGE if design.needed else GREEN, need_words(design.need)),
         (

@@ -106,7 +106,7 @@ class PaperDrawing:
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
         """Return how far a view reaches along `axis` (1: y, 2: z), below and above its origin [mm].
 
-        It holds `half` to both sides, the marked points, and a part of the block.
+        The view holds the length `half` to both sides, the marked points, and a part of the stage's block.
         """
         marked = [self.size(point[axis]) for point in self.points.values()]
         low, high = min(-half, *marked), max(half, *marked)

@@ -85,7 +85,10 @@ def circle(centre: SheetPoint, radius: float, fill: str = "none") -> str:
 def words(
     at: SheetPoint, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
 ) -> str:
-    """Return a text on its baseline; an `upright` text is read from the right."""
+    """Return a text whose baseline goes through `at`; an `upright` text is read from the right.
+
+    `anchor` says which part of the text stands at this point: "start", "middle" or "end".
+    """
     x, y = _n(at[0]), _n(at[1])
     turn = f' transform="rotate(-90 {x} {y})"' if upright else ""
     weight = ' font-weight="bold"' if bold else ""

@@ -124,7 +124,7 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate may be zero, and is of a bias or of viscous asymmetry."""
+    """Tell whether an estimate is one of a bias or of viscous asymmetry, and may be zero."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 

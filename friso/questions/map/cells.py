@@ -280,7 +280,10 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
 
 
 def _state(outcome: str | None, status: str | None) -> Category | None:
-    """Return why a cell has no numbers of its own; None if it was run to its end."""
+    """Return why a cell has no numbers of its own, as a category; None if it ran to its end.
+
+    `outcome` and `status` are the texts of the cell, None if the runs have no such variable.
+    """
     reason = status or ""
     if reason.startswith(INFERRED):
         return categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
@@ -294,9 +297,9 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
 
 
 def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
-    """Return evenly spread indices along dimensions, of at most `most` combinations.
+    """Return evenly spread indices along each dimension, together at most `most` combinations.
 
-    The longest dimension is thinned first.
+    `sizes` are the lengths of the dimensions. The longest one is thinned first.
     """
     counts = list(sizes)
     while math.prod(counts) > most and max(counts) > 1:

@@ -61,7 +61,7 @@ def headline(runs: xr.Dataset, name: str) -> str:
 
 
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
-    """Return the fraction of the map in which a finding holds, and where."""
+    """Say in which fraction of the map a finding holds, and in which range of each axis."""
     holds, completed = _flags(runs, name, finding.words)
     if not completed.any():
         return "No cell of the map has a result."
@@ -266,9 +266,10 @@ def _spans(axis: CellAxis, value: float) -> bool:
 
 
 def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
-    """Return between which cells along an axis hunting begins or ends, next to a cell.
+    """Return between which cells along an axis hunting begins or ends, next to the cell `at`.
 
-    A side on which a cell without a verdict lies nearer gives no result.
+    `words` are the verdicts of the cells, shape (n,). A side gives no text if a cell without a verdict comes first
+    there.
     """
     attracted = np.isin(words, ATTRACTED)
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))

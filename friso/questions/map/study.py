@@ -234,11 +234,11 @@ def write_beside(
 ) -> list[Path]:
     """Write figure, page and exports of a store, all of them or none, and return their paths.
 
-    Files that the store wrote earlier are replaced; other files only with `overwrite`. The store notes the new files
-    first, if it can.
+    Files that the store wrote earlier are replaced; other files only with `overwrite`. With `can_note`, the store notes
+    the digests of the new files first.
 
-    Raises StoreError if another process holds the store or nothing can be noted. Raises OSError if a file cannot be
-    written.
+    Raises StoreError if another process holds the store, or its notes cannot be written. Raises OSError if a file
+    cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
     from friso.studies.store_folder import lock_store

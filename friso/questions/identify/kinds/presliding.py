@@ -15,7 +15,7 @@ from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, S
 
 
 def _facts(result: Presliding) -> Facts:
-    """List mass and bristles, and how much of the force they explain."""
+    """List stiffness and damping of the bristles, the moving mass, and friction not explained."""
     facts = [
         ("Stiffness of the bristles", with_interval(result.stiffness)),
         ("Damping of the bristles", with_interval(result.damping)),
