@@ -133,15 +133,18 @@ class Fleet:
         return {**flat, **self._motion(flat, points)}
 
     def _motion(self, flat: Mapping[str, Any], points: int) -> dict[str, Any]:
-        """Return the keys of the motion with which machines make their own moves, at all points."""
+        """Return the keys `flat` with the motion changed so that machines make their own moves.
+
+        Changed keys are arrays with one value for each point and machine, the machines of the first point first.
+        """
         faster = {} if self.accelerations is None else {ACCELERATION: np.tile(self.accelerations, points)}
         moved = {**flat, **{key: value for key, value in faster.items() if key in flat}}
         return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the keys of each machine as factors on the stage's, for keys that the stage has.
+        """Return by which factor each machine differs from the stage, as arrays (count,) by key.
 
-        Both parts of a split mass vary with the whole mass.
+        Only keys that the stage has are returned. Both parts of a split mass get the factor of the whole mass.
         """
         ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
         masses = [key for key in self.ratios if key.startswith("masses.")]

@@ -433,10 +433,10 @@ class _Session:
     def tries_less(self) -> None:
         """Search once for the smallest change of the present controller.
 
-        The search starts from the working remedy of this controller that changes most. A second search starts from the
-        one that changes least, if it still is the smallest. If no change of this controller works, it starts from the
-        smallest of the other changes. If the result leaves keys unchanged, the remaining keys are searched again, and
-        that result is taken if it changes less.
+        The search starts from the working remedy of this controller that changes most. If it finds nothing smaller than
+        the smallest change so far, a second search starts from that change. If no change of this controller works, the
+        search starts from the smallest of the other changes. If a result leaves some keys unchanged, the others are
+        searched again, and the new result is taken if it changes less.
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]

@@ -232,7 +232,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     """Return the derivatives of the settling time into the band `within` [m], by the keys.
 
     A derivative is the change of position where the stage last enters the band, over its speed there. Returns None if
-    the time is not smooth, since neighbouring motions do not follow.
+    the stage does not settle in its run, or if the time does not change smoothly with the keys.
     """
     if not rests(flat):
         return None

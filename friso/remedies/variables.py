@@ -51,7 +51,7 @@ class Variable:
 def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
     """Return a key of the stage file as a variable between `low` and `high`.
 
-    It takes exactly the `present` value close to it; NaN means that there is none.
+    Close to the `present` value, the variable takes exactly that value; NaN means that there is none.
     """
     return Variable(key, low, high, lambda flat, value: {key: value}, present)
 

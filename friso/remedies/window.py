@@ -92,9 +92,10 @@ def _halve(
 
 
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether points meet the goal by moves and margins, each with one variable moved.
+    """Tell which points meet the goal by moves and margins, shape (n,).
 
-    `numbers` (n,) are the indices of the variables, and `places` (n,) their new coordinates from 0 to 1.
+    Each is a copy of the point `shares` with one variable moved. `numbers` (n,) are the indices of the variables, and
+    `places` (n,) their new coordinates from 0 to 1.
     """
     worst = RemedySettings.current().worst_time  # points that break a constraint cost more
     return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
@@ -103,8 +104,8 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Tell at which points enough surveyed machines do not hunt (`Search.clear`), shape (n,).
 
-    Each point has one variable moved: `numbers` (n,) are the indices of the variables, and `places` (n,) their new
-    coordinates from 0 to 1.
+    Each is a copy of the point `shares` with one variable moved. `numbers` (n,) are the indices of the variables, and
+    `places` (n,) their new coordinates from 0 to 1.
     """
     if not len(places):
         return np.ones(0, bool)

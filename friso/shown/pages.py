@@ -106,8 +106,8 @@ def script(name: str) -> Markup:
 def environment(package: str = OWN_TEMPLATES) -> Environment:
     """Return the templates of a package and of friso/shown/templates, for one page.
 
-    Texts are escaped, and a name without a value is an error. Words of `explained` texts are linked to the
-    `glossary`.
+    Texts are escaped, and a name without a value is an error. The filter `explained` links words of a text to the
+    `glossary` of the page.
     """
     templates = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
@@ -128,7 +128,7 @@ def _escaped_text(value: Any) -> Any:
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """Return a figure as a data address in quotation marks.
+    """Return a figure as a data address in quotation marks; with its note if `noted`.
 
     The image is printed, and seen in browsers without scripts.
     """

@@ -96,8 +96,9 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 class _Reader:
     """Reader of the numbers of an axis, of any sign.
 
-    `field` is the key's number or quantity. A free variable has none (None): it takes the SI unit of its first value's
-    kind of quantity. Signs are free because a value that no stage may have makes only its cells invalid.
+    `field` is the key's number or quantity. It is None for a free variable, which only links use: its first value's
+    kind of quantity decides the SI unit. Any sign is allowed, because a value that no stage may have makes only its
+    cells invalid.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:

@@ -17,7 +17,7 @@ from friso.studies.store_files import BLOCKS, digest_of, put, stored
 class Ledger:
     """The records of the blocks of a store at `path`: digests of their chunks.
 
-    They are for a `study`, by its digest, and its metrics.
+    The records are for a `study`, by its digest, and its metrics.
     """
 
     path: Path

@@ -51,9 +51,9 @@ class StageEvidence:
 class Word:
     """A word that a cell of a map can have.
 
-    It has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is longer.
-    `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand in the
-    third person ("swings"), for sentences that count cells.
+    The word has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is
+    longer. `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand
+    in the third person ("swings"), for sentences that count cells.
     """
 
     text: str
@@ -67,7 +67,7 @@ class Word:
 class MapFinding:
     """A statement on a map: which fraction of its cells has one of the `words`, and where.
 
-    For counts, it is the fraction of cells above 0. With `if_any` the statement is left out if no cell has the word.
+    For counts, the fraction is that of cells above 0. With `if_any` the statement is left out if no cell has the word.
     """
 
     clause: str

@@ -167,7 +167,7 @@ class Store:
     def done(self) -> list[str]:
         """Return the names of the completed blocks, as in Zarr.
 
-        They are read from existing files, because a store may claim any size.
+        The names are read from existing files, because a store may claim any size.
         """
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
@@ -291,8 +291,8 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 class StoreState:
     """State of a study's store.
 
-    It has the number of blocks, how many are done, and the names of damaged blocks. It also lists damaged files of
-    metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
+    Fields are the number of blocks, how many are done, and the names of damaged blocks. Further fields list damaged
+    files of metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
     """
 
     blocks: int

@@ -67,7 +67,7 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
 def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np.ndarray]:
     """Return a function from the index of a run to its reference [m] at `time` [s].
 
-    Usually all runs have the same.
+    If all runs have the same motion, the reference is computed once.
     """
     moved = {key: value for key, value in flat.items() if key.startswith("motion.")}
     if not any(np.ndim(value) for value in moved.values()):
@@ -87,7 +87,8 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 def _extremes(values: np.ndarray) -> np.ndarray:
     """Return the least and the largest value of each piece of a run, in order of time.
 
-    They are NaN if a piece is not complete.
+    `values` is cut into the pieces of the settings; the result has the shape (2 pieces,). Both values are NaN if a
+    piece is not complete.
     """
     settings = StudySettings.current()
     pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)

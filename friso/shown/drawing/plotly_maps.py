@@ -31,7 +31,7 @@ SYMBOLS: dict[str, dict[str, Any]] = {
 
 
 def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
-    """Return the panels that have a colour bar, and whether one bar serves all of them."""
+    """Return the indices of the panels with a colour bar, and whether one bar serves all panels."""
     bars = {
         number: (scale(field), field.label)
         for number, panel in enumerate(panels)

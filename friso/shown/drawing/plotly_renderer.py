@@ -203,9 +203,10 @@ class _Head:
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
-        """Return the legend as plotly takes it, above axes at a place in fractions of the figure.
+        """Return the legend as plotly takes it, with the title above the legend's entries.
 
-        The title stands above the entries, which take fewer rows if there is more room.
+        The legend stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure. The
+        entries take fewer rows if there is more room.
         """
         place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
         kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
@@ -214,7 +215,7 @@ class _Head:
     def alone(self, left: float, top: float) -> dict[str, Any]:
         """Return the title as plotly takes it without a legend.
 
-        It stands above axes at a place in fractions of the figure.
+        The title stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure.
         """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
         return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
@@ -298,8 +299,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
 def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     """Return the ticks of a logarithmic axis.
 
-    They are decades, with 2 and 5 or more between them if decades are too few; plotly itself would write 0.5 as "5". If
-    even these are too few, there are about five round numbers.
+    Ticks stand at decades, and at 2 and 5 or more numbers between them if decades are too few. Plotly itself would
+    write 0.5 as "5". If all these are too few, there are about five round numbers.
     """
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:

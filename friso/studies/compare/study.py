@@ -137,10 +137,11 @@ class OptionResult:
 class Paired:
     """An option compared with option a, on the same machines.
 
-    `swinging` is the increase in the probability of swinging at the end. `sooner` and `later` are the fractions of
-    machines that are in position sooner or later than with option a. `alike` is the fraction that is so at the same
-    time, or never with both. `in_position` and `force` are medians over the machines, of the option's value divided by
-    that with option a. The values are the root mean square deviation in position, and the root mean square force.
+    `swinging` is the increase in the probability of swinging at the end. `sooner`, `later` and `alike` are fractions of
+    machines: in position sooner or later than with option a, or at the same time (or never with both).
+
+    `in_position` and `force` are medians over the machines, of the option's value divided by that with option a. The
+    values are the root mean square deviation in position, and the root mean square force.
     """
 
     swinging: EstimatedValue

@@ -121,7 +121,7 @@ def convert(
 
     A law with parallel elements gets `elements` of them. Before sliding, the stage's own law counts as measured, or the
     points in the file `virgin`. Raises InputError for a law to which friction cannot be converted, and for a stage
-    whose own law does not stick. It is also raised for a file without a usable virgin curve.
+    whose own law does not stick. A file without a usable virgin curve also raises it.
     """
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"

@@ -114,7 +114,7 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 def interval(stage: Stage, length: float) -> float:
     """Return a log's sample time [s]: at most `length`, in whole samples of the drive.
 
-    It is at least one such sample, even if that is longer than `length`.
+    The sample time is at least one such sample, even if that is longer than `length`.
     """
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

@@ -50,8 +50,8 @@ The duration is in periods of the stage's crossover. A loop with a larger error 
 class Plant:
     """The plant as identified from several logs: one response each, and their average.
 
-    It has the frequency [Hz] of the first mode of a free joint (NaN: locked). `mass` is that of the mass line (where
-    force over acceleration is constant), and `band` its frequency range [Hz].
+    `first_mode` [Hz] is the frequency of the first mode of a free joint (NaN: locked). `mass` is that of the mass line
+    (where force over acceleration is constant), and `band` its frequency range [Hz].
     """
 
     single: tuple[FrequencyResponse, ...]
@@ -221,7 +221,7 @@ def mass_between(response: FrequencyResponse, low: float, high: float) -> Estima
 def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
     """Return the masses [kg] that a stage's response shows for the motor constants of `RATIOS`.
 
-    The response is measured at a place [m] on the rail.
+    The result has the shape (ratios,). The response is measured at a place [m] on the rail.
     """
     ratios = np.array(RATIOS)
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
@@ -232,9 +232,10 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
 
 
 def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the crossovers [Hz] tried, and which of them brought the stage to its reference.
+    """Return the crossovers [Hz] tried, and which of them are stable, both of shape (STEPS,).
 
-    The stage is released beside its reference, at a place [m].
+    The stage is released beside its reference, at a place [m]. A crossover counts as stable if the stage is not farther
+    off in the last quarter of the run.
     """
     factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
     off = RELEASED * stage.flat()["joint.stroke"] / WIDE
