@@ -1,8 +1,8 @@
 """Pack answers for the page: frames of a JSON text and of its numbers in binary.
 
-A frame begins with two whole numbers of four bytes, least significant byte first. They are the lengths of the text and
-of the numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}.
-Arrays are float32.
+A frame begins with two whole numbers of four bytes, least significant byte first: the lengths of the text and of the
+numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}. Arrays are
+float32.
 """
 
 from __future__ import annotations

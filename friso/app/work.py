@@ -142,8 +142,9 @@ class Workshop:
     ) -> AsyncIterator[bytes]:
         """Yield the frames of an answer as they come. The work ends when the reader stops.
 
-        The question ends an older one of the `page` on this `lane`. A `quick` question computes nothing and does not
-        wait for others. All others wait for the first part of a question that goes `first`.
+        The question ends an older one of the `page` on this `lane`, which has a smaller `number`. A `quick` question
+        computes nothing and does not wait for others. All others wait for the first part of a question that goes
+        `first`.
         """
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 

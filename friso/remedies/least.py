@@ -29,8 +29,8 @@ of the search, so other machines may need more."""
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
     """Return a remedy that varies each changed key of the controller separately.
 
-    Each key ranges from its value `before` to its `tuned` value, and slightly beyond. Everything else is as `tuned`.
-    Returns None if no key of the controller changed.
+    The range of a key is from its value `before` to its `tuned` value, and slightly beyond. Everything else is as
+    `tuned`. Returns None if no key of the controller changed.
     """
     old, new = before.flat(), tuned.flat()
     variables = [
@@ -165,8 +165,9 @@ def _ends(remedy: Remedy) -> np.ndarray:
 def candidates(search: Search) -> Iterator[np.ndarray]:
     """Yield settings to verify, as points of shape (variables,), the smallest change first.
 
-    They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
-    the working settings, then other points tried. Points that work on fresh machines come before all others.
+    First come settings that work on fresh machines: the smallest change tried that breaks no constraint, this change
+    taken further, points between it and the working settings, and other small changes tried. The best of all points
+    tried follow (`Search.surveyed`).
     """
     settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points

@@ -82,9 +82,9 @@ class Fleet:
     """Machines drawn around a stage, as changes of its keys, all of shape (count,).
 
     `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves of the
-    machines; `accelerations` [m/s^2] are given if they differ from the file's. `moves` is the range from which both
-    were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of other
-    keys. `left_out` counts invalid draws, which were replaced.
+    machines. `accelerations` [m/s^2] are those of the moves, None if all have the file's. `moves` is the range from
+    which sizes and accelerations were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads`
+    [%] the default spreads of other keys. `left_out` counts invalid draws, which were replaced.
     """
 
     ratios: Mapping[str, np.ndarray]

@@ -38,8 +38,8 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation for each set of parts of the goal, the smallest first.
 
-    Only sets with the fewest parts are returned. The distance from hunting is never relaxed: at the points considered,
-    no surveyed machine hunts. If an allowance of work is used up, remedies that come later are left out.
+    Only sets with the fewest parts are returned. The distance from hunting is never relaxed: surveyed machines do not
+    hunt at the points considered. If an allowance of work is used up, the remaining remedies are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     with suppress(Exhausted):

@@ -47,10 +47,10 @@ class Budget:
 class TriedPoints:
     """The settings that were tried, one point in each row, and how the machines performed.
 
-    `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for the fraction `goal.share` of the machines. They are `settling` within the tolerance, and `looser`
-    within a looser one. `slower` is for the looser one, too, at a bandwidth lower by the distance from hunting. Largest
-    force [N] and least modulus margin hold for the same fraction.
+    `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Three
+    settling times [s] hold for the fraction `goal.share` of the machines: `settling` within the tolerance, `looser`
+    within a looser one, and `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest
+    force [N] and least modulus margin hold for this fraction, too.
 
     The bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1,
     grows with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
@@ -98,7 +98,8 @@ class TriedPoints:
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
         """Return the indices of points that serve only the larger moves, up to `largest` [m].
 
-        They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
+        Such points break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes
+        first.
         """
         broken = self.broken(goal)
         some = self.moves_from <= largest / RemedySettings.current().large_share
@@ -135,7 +136,7 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 class Search:
     """Search for the best settings of a remedy, called points, on `machines`.
 
-    Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
+    Points that the search returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
     surveyed points at which machines hunt, or may hunt. `cut` is true if the search took too much work.
     """
 

@@ -104,7 +104,8 @@ class Attraction:
     """Which machines hunt at which points, as arrays of shape (points, machines).
 
     `attracts` is true if a machine hunts at its bandwidth, or at one lower by up to the goal's distance. `decided` is
-    true if the simulations sufficed to say so, and `certain` if in addition no other attractor can exist.
+    true if the simulations sufficed to say so. `certain` is true if, in addition, nothing can attract that no
+    simulation starts from.
     """
 
     attracts: np.ndarray

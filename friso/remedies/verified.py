@@ -113,8 +113,9 @@ class Performance:
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
         """Return the smallest and largest move [m] between which the goal holds, or None.
 
-        Of the moves next to either end, however many are taken, at least the required fraction meets the goal. The
-        result is None if there are no such moves, or if the moves are unknown or were not surveyed for hunting.
+        Counted inwards from either end of this range, at least the required fraction of the moves meets the goal,
+        however many are counted. The result is None if there is no such range, if the moves are unknown, or if machines
+        were not surveyed for hunting.
         """
         order = np.argsort(self.sizes, kind="stable")
         if self.moves_drawn is None or not order.size or not self.is_surveyed:
@@ -196,8 +197,9 @@ class Performance:
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     """Return the first and last index of the stretch of moves that best meets the goal.
 
-    `meets` is true where a move meets it, in ascending order of moves. Any part of the stretch at either of its ends
-    has at least the required fraction `share`. Returns None if no stretch is long enough to show that.
+    `meets` is true where a move meets the goal, in ascending order of moves. Counted inwards from either end of the
+    stretch, at least the fraction `share` meets it, however many moves are counted. Returns None if no stretch is long
+    enough to show that.
     """
     if meets.all():
         return 0, len(meets) - 1
@@ -212,9 +214,9 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 class RemedyOutcome:
     """Outcome of a remedy: its best `stage`, how machines perform with it, and whether it works.
 
-    `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; if there are none, it works.
-    `windows` give how far each number may vary. `confirmation` is the search for hunting of the stage itself; None if
-    too many machines miss the goal.
+    `stage` is None if no settings were good enough. `doubts` are the reasons why the remedy is not sure to work;
+    without any, it works. `windows` give how far each number may vary. `confirmation` is the search for hunting of the
+    stage itself; None if too many machines miss the goal.
 
     `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
     coordinates of the stage in the remedy's ranges. `cut` is true if the search took too much work, and `untried` if

@@ -17,8 +17,8 @@ from friso.remedies.settings import RemedySettings
 class VariableWindow:
     """Range of a variable around its tuned `value`, in which machines meet the goal.
 
-    The range is from `low` to `high`. All three are in SI, or factors; everything else is as tuned. `open_below` and
-    `open_above` are true if the range reaches an end of the search.
+    The range is from `low` to `high`. These and `value` are in SI, or factors on the bandwidth. All other variables
+    stay as tuned. `open_below` and `open_above` are true if the range reaches an end of the search.
     """
 
     name: str

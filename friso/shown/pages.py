@@ -53,8 +53,8 @@ class Report:
     """The page of a `command`: name, figures, stage file, and contents by name.
 
     `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
-    is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
-    templates of the package `templates`. Pages that are `scripted` load plotly even without figures.
+    is one, stands in the folder templates of the package `templates`. It extends `page.html` and changes its blocks:
+    answer, table, figures, footer. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str
@@ -160,7 +160,7 @@ TENTHS = 10
 def _shortened(path: re.Match[str]) -> str:
     """Write an SVG path in less text.
 
-    Each place is relative to the one before, to a tenth of a point.
+    All places are relative to the one before, to a tenth of a point.
     """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])

@@ -234,7 +234,7 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
 def read_axes(
     stage: Stage, axes: Mapping[str, AxisValues], free: frozenset[str], log: bool = False
 ) -> tuple[SweptAxis | SweptRange, ...]:
-    """Return all axes of a study from texts, lists or arrays with a unit, by name.
+    """Return all axes of a study; `axes` are texts, lists or arrays with a unit, by name.
 
     Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. With `log`, ranges
     are logarithmic unless they state their spacing. Raises InputError for a name or values that the stage cannot have.

@@ -170,8 +170,9 @@ class StabilityChange(NamedTuple):
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return the changes at which hunting begins and ends over the range, in order.
 
-    Verdicts within the error of a special point (flip, fold or torus) do not locate a change. Unstable cycles are so
-    weak there that runs may stay on them. But such verdicts do show hunting between stages that do not hunt.
+    Verdicts within the error of a special point (flip, fold or torus) do not locate a change: cycles are so weakly
+    unstable there that runs may stay on them. Between stages that do not hunt, however, even such a verdict shows that
+    hunting begins and ends.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)

@@ -1,8 +1,8 @@
 """Define metrics of a map: how a cell's value is computed, coloured and named.
 
-Each metric is a module of `metrics`. Such a module has `METRIC` and the name of the metric; installed packages name
-theirs in the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all
-follow from it.
+Each metric is a module of `metrics`, named after the metric, which defines `METRIC`. Installed packages name theirs in
+the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow
+from `METRIC`.
 """
 
 from __future__ import annotations

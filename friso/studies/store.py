@@ -76,8 +76,8 @@ class Store:
     def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
         """Open the store of a study, created if it is not there.
 
-        With `overwrite` it replaces the store of another study, or a damaged one. Raises StoreError if the folder holds
-        anything else or another study, or is in use by another process.
+        With `overwrite`, the store of another study, or a damaged one, is replaced. Raises StoreError if the folder
+        holds anything else or another study, or is in use by another process.
         """
         remove_leftovers(path)
         path = where_links_lead(path)
@@ -238,7 +238,7 @@ class Store:
 
     @property
     def notes(self) -> Mapping[str, Any]:
-        """Return friso's own notes on the store, such as colours of figures."""
+        """Return friso's own notes on the store, such as the metric that colours its map."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:

@@ -45,7 +45,7 @@ def stored(file: Path) -> bytes:
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
     """Return the SHA-256 of a file, of a store or beside it, or None.
 
-    It is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
+    The result is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
     PermissionError if the file cannot be read, which does not mean that it is damaged.
     """
     try:

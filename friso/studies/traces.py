@@ -25,10 +25,10 @@ DRAWING = "drawing runs"
 class Traces:
     """Deviations of positions from their references [m], reduced for drawing.
 
-    `deviations`, shape (cells, 2 pieces), has two extremes in order of time for each of the equal pieces of `duration`
-    [s]. It is NaN after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final
-    behaviour. It lies half-way from the last corner to the end of the run, or from the start if that corner is very
-    late.
+    A run is cut into equal pieces over `duration` [s]. `deviations`, shape (cells, 2 pieces), has the least and the
+    largest value in each piece, in order of time; NaN after the end of a run. `late`, shape (cells,), is the time [s]
+    after which a run shows its final behaviour. It lies half-way between the last corner, or the start if that corner
+    is very late, and the end of the run.
     """
 
     deviations: np.ndarray

@@ -82,8 +82,8 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     """Return the loosest tolerance at which enough outcomes survive a tighter one.
 
     How many are enough is the setting `wanted_survival`. Also returns the surviving fraction at each tolerance tried,
-    and the number of cells used. If no cell has a valid stage, there are no fractions, and the tightest tolerance is
-    returned. If no tolerance is good enough, it is the one at which most outcomes survive.
+    and the number of cells used. If no tolerance is good enough, the one at which most outcomes survive is returned. If
+    no cell has a valid stage, there are no fractions, and the tightest tolerance is returned.
     """
     settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))

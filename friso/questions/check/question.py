@@ -48,9 +48,9 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
-    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds what machines do that
-    were drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some of them undrawn. `laws` holds the
-    verdicts under all friction laws, or None.
+    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` are the results on machines
+    drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some machines undrawn. `laws` holds the verdicts
+    under all friction laws, or None.
     """
 
     stage: Stage

@@ -31,8 +31,8 @@ TIME = Axis("Time", "s")
 class PredictionView(Generic[Result]):
     """How to show another log that the model from a kind of experiment predicts.
 
-    Of the prediction, `worst` returns the largest relative error, and `sentence` describes the errors. `numbers` go
-    into the JSON document. `figures` take the log's number as well, for their names.
+    All fields are functions of the prediction. `worst` returns the largest relative error, and `sentence` describes the
+    errors. `numbers` go into the JSON document. `figures` also takes the log and its number, for the figures' names.
     """
 
     worst: Callable[[Result], float]

@@ -56,9 +56,9 @@ MappingKeeper = Callable[[dict[Path, Mapping]], object]
 class IdentifyAnswer(Answer):
     """The machine that logs show.
 
-    `result` is an `Identification` with the estimates. It holds a `stage` if the logs describe a whole machine.
-    `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of friso check
-    on the stage, where that was asked.
+    `result` is an `Identification` with the estimates, and with a `stage` if the logs describe a whole machine.
+    `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of `friso
+    check` on the stage; None unless that was asked for.
     """
 
     inputs: Sequence[LogFile]

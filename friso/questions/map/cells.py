@@ -233,9 +233,9 @@ def coloured(runs: xr.Dataset) -> list[str]:
 def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
-    Limits that a metric defines are taken as they are. Each count gets one colour; 0 gets the colour of a stage at
-    rest. Numbers that span more than three decades get a logarithmic scale of at most six: anything smaller is solver
-    noise of a stage at rest.
+    `name` is the metric. Limits that it defines are taken as they are. If its numbers are counts, each count gets one
+    colour; 0 gets the colour of a stage at rest. Positive numbers that span more than three decades get a logarithmic
+    scale of at most six: anything smaller is solver noise of a stage at rest.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:

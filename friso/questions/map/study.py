@@ -211,8 +211,8 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
     """Refuse to write over anything but earlier results of this study.
 
-    If figure and page are written beside the store, `beside` is the example that a refusal shows. Raises InputError for
-    foreign files, and StoreError for a store with another study; `overwrite` allows both.
+    If figure and page are written beside the store, `beside` is the example in a refusal. Raises InputError for files
+    of others, and StoreError for a store with another study; `overwrite` allows both.
     """
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other

@@ -95,7 +95,7 @@ _SYMBOLS: dict[str, dict[str, Any]] = {
 def render(figure: Figure) -> Canvas:
     """Draw a figure on a matplotlib canvas.
 
-    Its lines carry the arrays of `drawable(figure)`, in that order.
+    The lines on the canvas carry the arrays of `drawable(figure)`, in that order.
     """
     with _style():
         prepared = drawable(figure)

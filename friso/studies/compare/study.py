@@ -156,8 +156,9 @@ class Paired:
 class Comparison:
     """Results of all options on machines drawn with a seed.
 
-    A machine is in position `within` a tolerance [m]. `needed` gives the bandwidth that the controller alone needs. No
-    faster controller exceeds `bandwidth_limit` [Hz]. An interruption skipped the options in `not_run`.
+    A machine is in position `within` a tolerance [m]. `needed` says how many machines come to rest over the bandwidth
+    of the controller alone; None if that was not computed. No faster controller exceeds `bandwidth_limit` [Hz]. An
+    interruption skipped the options in `not_run`.
     """
 
     machines: Machines

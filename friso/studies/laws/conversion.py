@@ -46,8 +46,8 @@ energy lost in a hysteresis loop before sliding, and the loop's stiffness from e
 class MeasuredChange:
     """A measured quantity `before` and `after` the conversion of a friction law [unit].
 
-    `off` is its error: relative to static friction for curves, and relative to the number itself for numbers. An error
-    of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
+    `off` is the error by the conversion: relative to static friction for curves, and relative to the number itself for
+    numbers. An error of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
     """
 
     kind: MeasuredKind

@@ -175,9 +175,9 @@ class VerdictsByLaw:
     def deciding(self, case: str) -> list[str]:
         """Return the experiments that would decide whether the stage hunts in a case.
 
-        There are none if all laws agree, or if no answer is certain. If the answer depends on keys left open in a law,
-        the experiments determine the keys. Otherwise they separate the laws that disagree, or are not certain, from the
-        others.
+        There are none if all laws agree, or if no answer is certain. If the answer depends on keys that measurements
+        leave open in a law, the experiments determine these keys. Otherwise, the experiments separate the laws that
+        disagree, or are not certain, from the others.
         """
         if self.hunts(case) is not None or not self.answers(case):
             return []

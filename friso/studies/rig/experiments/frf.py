@@ -82,9 +82,9 @@ class MeasuredLoop:
 class Frf:
     """Results of the frequency-response experiment.
 
-    They are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2, ratios),
-    are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings` [Hz], shape
-    (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
+    Fields are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2,
+    ratios), are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings`
+    [Hz], shape (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
     """
 
     locked: Plant

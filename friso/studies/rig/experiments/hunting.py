@@ -62,8 +62,8 @@ class Trace:
 class Startable:
     """A machine that comes to rest `after_move`, but swings after a release, `after_release`.
 
-    After the move no peaks are counted; after the release it swings to the end. It has its crossover [Hz], the index of
-    its rail, and the `displacement` [m] of the release.
+    After the move no peaks are counted; after the release it swings to the end. `crossover` [Hz] is its crossover,
+    `rail` the index of its rail, and `displacement` [m] where it is released.
     """
 
     after_move: Trace
@@ -78,12 +78,14 @@ class HuntingResult:
     """Results of the hunting experiment.
 
     `distance` [m] is the length of the move. `cases` are the outcomes of the moves, joint locked and free, arrays of
-    shape (crossovers, rails). They are at `crossovers` [Hz] on `rails` (seeds, the stage's own first). `started` are
-    the outcomes of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
-    `plotted` are the indices of the thesis's crossovers. `rail` is the index of the rail of the logs and of the
-    `traces`, by case and index of the crossover. It is the first one with counted peaks, locked, at the stage's own
-    crossover, or else the stage's own. `startable` is a machine that comes to rest after the move but hunts after a
-    release, None if there is none.
+    shape (crossovers, rails). The moves are made at `crossovers` [Hz] on `rails` (seeds, the stage's own first).
+    `started` are the outcomes of releases with the joint locked, shape (displacements, crossovers, rails), by
+    `displacements` [m].
+
+    `plotted` are the indices of the thesis's crossovers. Logs and `traces`, by case and index of the crossover, are
+    those of one rail, with the index `rail`. It is the first rail with counted peaks at the stage's own crossover,
+    joint locked; if there is none, it is the stage's own rail. `startable` is a machine that comes to rest after the
+    move but hunts after a release, None if there is none.
     """
 
     distance: float

@@ -43,8 +43,8 @@ SPEEDS = (1, 2, -1, -2)
 class Stiction:
     """Results of the stiction experiment.
 
-    Each log is evaluated with the joint's true stiffness. For each rail, `true` has the least and greatest true static
-    friction [N] where the cart went, shape (rails, 2). `speed` [m/s] is the slow one.
+    The logs are evaluated with the joint's true stiffness. For each rail, `true` has the least and greatest true static
+    friction [N] where the cart went, shape (rails, 2). `speed` [m/s] is that of the slow motion.
     """
 
     by_rail: tuple[StickSlip, ...]
