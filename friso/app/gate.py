@@ -102,7 +102,7 @@ class Access:
     def is_host(self, host: str) -> bool:
         """Tell whether the server goes by this name, in small or capital letters.
 
-        A request under a foreign name means that another site made its name lead to this server.
+        A request under another name means that some site has made its own name lead to this server.
         """
         return host.lower() in self.hosts
 

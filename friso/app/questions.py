@@ -190,7 +190,7 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield whether the stage hunts, for every case, with its margin."""
+    """Yield whether the stage hunts, as given and with its joint locked and free, and margins."""
     options = asked.chosen(*OPTIONS["check"])
     ghosts = _ghosts(asked, work, friso.check)
     answer = KEPT.answer(friso.check, asked.machine, work, options)

@@ -100,7 +100,7 @@ class Work:
 class Messages(logging.Handler):
     """A log handler that sends each message to the question that caused it.
 
-    Messages stay below the answer, except those on the compilation of kernels.
+    Messages stay on the page below the answer, except those on the compilation of kernels.
     """
 
     def emit(self, record: logging.LogRecord) -> None:

@@ -77,7 +77,8 @@ def _within(
 ) -> Iterator[RelaxedGoal]:
     """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
 
-    The parts `limited` may only be relaxed by a reasonable factor. `needed` has the factors that each point needs.
+    `needed` has, by part, the factor by which each of the `points` must be relaxed. Parts in `limited` may not be
+    relaxed by more than a reasonable factor. A few of the `machines` must not hunt at a point.
     """
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}

@@ -28,7 +28,7 @@ DAMPING_RATIOS = (0.01, 0.3)
 class Variable:
     """A number between `low` and `high` (SI) on a logarithmic scale.
 
-    Close to the `present` number it takes exactly that value; NaN means that there is none.
+    Close to the `present` value, the number takes exactly that value; NaN means that there is none.
     """
 
     name: str
@@ -75,7 +75,7 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
 def joint_variables(friction: float) -> tuple[Variable, ...]:
     """Return stroke, stiffness and damping of an isolator as variables.
 
-    Their ranges follow from the least static `friction` [N].
+    The ranges of the variables follow from the least static `friction` [N].
     """
 
     settings = RemedySettings.current()

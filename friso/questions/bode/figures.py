@@ -82,7 +82,7 @@ def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
 
 @dataclass(frozen=True)
 class ResponseCurve:
-    """A complex frequency response, shape (k,), as a Bode plot draws it."""
+    """A complex frequency response, shape (k,), with the label and the look of its curve."""
 
     response: np.ndarray
     label: str

@@ -121,7 +121,7 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Say at which of the values tried the loop is unstable, whatever the friction.
 
-    The list is empty if it is stable at all of them.
+    The list is empty if the loop is stable at all of them.
     """
     if not traced.unstable.any():
         return []
@@ -277,7 +277,7 @@ def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors:
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
-    """Return a remark if a change lies where the loop is unstable anyway; empty otherwise."""
+    """Return a remark if hunting begins or ends where the loop is unstable anyway; else empty."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 

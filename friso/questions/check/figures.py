@@ -98,9 +98,9 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Draw the deviation after the move with its counted peaks, and the settling.
+    """Draw the deviation after the move with its counted peaks, and how it settles.
 
-    It is Fig. 5 of the thesis.
+    The figure is like Fig. 5 of the thesis.
     """
     start, end = _window(cases)
     lines, peaks = [], []

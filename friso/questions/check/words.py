@@ -258,7 +258,7 @@ def _later(case: Case) -> str:
 
 
 def _stuck(case: Case) -> str:
-    """Say that the motion does not break the stage away, if only its bristles yield."""
+    """Add that the motion does not break the stage away, with both forces; empty if it does."""
     if not case.unmoved:
         return ""
     force, least = _forces(case.largest_force, case.breakaway)
@@ -384,7 +384,10 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key that sets the bandwidth; None if it is a crossover or does not exist."""
+    """Return the key that sets the bandwidth, unless this key is a crossover.
+
+    Returns None for a crossover, and if no key sets the bandwidth.
+    """
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
@@ -449,7 +452,10 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
-    """Say to which lower bandwidth the stage settles, in place of a higher one."""
+    """Say to which bandwidth the controller has to be slowed down for the stage to settle.
+
+    `end` is the lower end of the bandwidths at which hunting attracts. The text says if it is not certain.
+    """
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
     return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
 

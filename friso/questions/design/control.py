@@ -104,7 +104,7 @@ def _margin(design: Design) -> str:
 
 
 def _damping(design: Design) -> str:
-    """Say whether more damping in the joint would raise the modulus margin enough."""
+    """Say whether damping is worth adding in the joint, to raise the least modulus margin."""
     damping = design.controller.damping
     as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
     now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"

@@ -141,7 +141,7 @@ def _stage_note(drawing: PaperDrawing) -> list[str]:
 def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
     """Return the stage as a block in the view from the side (1) or from above (2).
 
-    Parts without room on the sheet are cut off.
+    `middle` is the height on paper of the view's origin. Parts without room on the sheet are cut off.
     """
     (x1, x2), (low, high) = drawing.block[0], drawing.block[view]
     (left, right), (bottom, top) = drawing.spans[0], drawing.spans[view]

@@ -79,19 +79,22 @@ class PaperDrawing:
 
     @cached_property
     def block(self) -> tuple[tuple[float, float], ...]:
-        """Return the extent of the stage's block along x, z and y from the origin [mm on paper]."""
+        """Return both ends of the stage's block along x, z and y, from the origin [mm on paper]."""
         centre, edges = self.mechanism.body.centre, block_size(self.mechanism)
         return tuple((self.size(centre[k] - edges[k] / 2), self.size(centre[k] + edges[k] / 2)) for k in (0, 2, 1))
 
     @property
     def core(self) -> tuple[float, float]:
-        """Return the extent along x of the parts that must be visible: leaves, clamps, marked points."""
+        """Return both ends, along x, of the parts that must be visible [mm on paper].
+
+        These parts are leaves, clamps and marked points.
+        """
         marked = [self.size(point[0]) for point in self.points.values()]
         return min(-CLAMP, *marked), max(self.size(self.mechanism.length) + CLAMP, *marked)
 
     @cached_property
     def spans(self) -> tuple[tuple[float, float], ...]:
-        """Return the extents of the views along x, z and y.
+        """Return both ends of the views along x, z and y, from the origin [mm on paper].
 
         The views show all parts that must be visible, and as much of the stage's block as there is room for.
         """

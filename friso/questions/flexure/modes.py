@@ -183,7 +183,7 @@ def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return a few cross-sections of a leaf between cart and stage, at rest and moved.
 
-    Their turn grows evenly up to the turn of the stage.
+    Along the leaf, sections turn by an evenly growing part of the turn of the stage.
     """
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):

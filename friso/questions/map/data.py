@@ -69,7 +69,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
 def machine_of(runs: xr.Dataset) -> Stage | None:
     """Return the machine around which keys were swept.
 
-    Returns None if keys are tied to others, or if the runs are no study of friso.
+    Returns None if links tie keys to others, or if the runs are no study of friso.
     """
     if json.loads(runs.attrs.get("links", "{}")):
         return None

@@ -178,7 +178,7 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
     """Say in how many cells peak counts or verdicts disagree with the end of the run.
 
-    The list is empty if there are no such cells, or the map lacks one of the two.
+    The list is empty if there are no such cells, or if the runs lack the variables to compare.
     """
     if name in worded(verdicts=True) and name != "outcome" and {name, "outcome"} <= set(runs.data_vars):
         hidden = int(((runs[name].values == "hunts") & np.isin(runs["outcome"].values, (RESTS, CREEPS))).sum())

@@ -77,7 +77,7 @@ LARGE = 10_000_000
 class SweepAnswer(Answer):
     """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
 
-    `metric` colours its map. `store` is the folder that holds it, or None.
+    `metric` is the variable that colours the map. `store` is the folder of the runs, or None if they are in memory.
     """
 
     study: Study

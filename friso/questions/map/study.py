@@ -157,7 +157,10 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
 
 def coloured_by(study: Study, metric: str) -> str:
-    """Return the variable that colours the map: the metric, or another that shows it."""
+    """Return the variable that colours the map.
+
+    It is the metric asked for or, if the study has it, the metric that maps show in its place (`Metric.shown_as`).
+    """
     other = metrics()[metric].shown_as
     return other if other in study.metrics else metric
 

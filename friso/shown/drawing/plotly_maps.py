@@ -60,7 +60,7 @@ def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | N
 
 
 def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, Any], place: dict[str, Any]) -> Any:
-    """Return one layer of a map or cloud; places without a value stay empty."""
+    """Return the trace of a map's or cloud's numbers or categories; cells without one are empty."""
     where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
     if values is not field.codes:
         where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"

@@ -125,9 +125,10 @@ class OptionResult:
 
     @property
     def rests(self) -> bool:
-        """Tell whether the option brings `ENOUGH` machines into position, and they stay there.
+        """Tell whether enough machines come into position with the option, and stay there.
 
-        Machines that were run for longer show whether they stay; without such runs the result is false.
+        `ENOUGH` is the fraction required of all machines in position, and of those run for longer that stay. Without
+        longer runs the result is false.
         """
         in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
         return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)

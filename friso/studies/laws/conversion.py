@@ -198,7 +198,7 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table [friction] of a stage file for a law and its keys [SI].
 
-    Its units are those of the stage's axis.
+    Values are written in the units of the stage's axis.
     """
     cls, kind = friction_law(law), stage.axis_kind
     table: dict[str, Any] = {"model": law}
