@@ -37,7 +37,7 @@ class ChangeSize:
 
 
 def change_size(before: Stage, after: Stage) -> ChangeSize:
-    """Measure how much one stage changes into another: parts bought, keys, and factors."""
+    """Measure how large the change from one stage to another is: parts bought, keys, factors."""
     old, new = before.flat(), after.flat()
     bought = any(_differ(old.get(key), new.get(key)) for key in {*old, *new} if key.startswith(PARTS))
     keys = [key for key in {*old, *new} if key.startswith(f"{CONTROLLER}.") and _differ(old.get(key), new.get(key))]

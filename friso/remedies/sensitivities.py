@@ -195,7 +195,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Return a stage's flat keys, some slightly changed so that its equations contain all `keys`.
+    """Return a stage's flat keys, some slightly changed so that equations contain all `keys`.
 
     An exponent that is a whole number, for example, would otherwise be built in as a constant. Raises InputError for a
     key that equations never contain.

@@ -118,7 +118,7 @@ def has_limiter(bode: Bode) -> bool:
 
 
 def has_family(bode: Bode) -> bool:
-    """Tell whether there are states beside the limit cases, which only friction creates."""
+    """Tell whether there are more states than the limit cases; only friction creates some."""
     return len(bode.scan.members) > len(bode.cases)
 
 

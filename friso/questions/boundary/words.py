@@ -356,7 +356,7 @@ def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Give the verdicts at the corners, in one sentence if they agree."""
+    """Give the verdicts at the corners of the plane, in one sentence if they agree."""
     corners = corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]

@@ -76,7 +76,7 @@ def _return_map(item: ShownCase) -> list[Panel]:
 
 
 def _mirrored(hunting: Hunting) -> bool:
-    """Tell whether both sides swing alike, so that one curve describes both."""
+    """Tell whether swings to both sides are alike (all cycles symmetric): one curve shows both."""
     return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
 
 

@@ -319,7 +319,7 @@ def _running_away(case: Case) -> list[str]:
 
 
 def _or_more(kick: Kick) -> str:
-    """Say that all larger kicks searched do the same, if they do."""
+    """Add " or more" if all larger kicks searched start hunting as well; else nothing."""
     return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
 
 

@@ -122,18 +122,18 @@ class PaperDrawing:
 
     @property
     def x0(self) -> float:
-        """Return x = 0 on paper [mm]; the views stand centred between the notes."""
+        """Return where x = 0 lies on paper [mm]; the views stand centred between the notes."""
         left, right = self.spans[0]
         return LEFT + 5 - left + max(0.0, (WIDTH - 10 - LEFT - RIGHT - (right - left)) / 2)
 
     @property
     def z0(self) -> float:
-        """Return z = 0 on paper [mm], in the view from the side."""
+        """Return where z = 0 lies on paper [mm], in the view from the side."""
         return 5 + ABOVE + self.spans[1][1]
 
     @property
     def y0(self) -> float:
-        """Return y = 0 on paper [mm], in the view from above."""
+        """Return where y = 0 lies on paper [mm], in the view from above."""
         return self.z0 - self.spans[1][0] + BELOW + ABOVE + self.spans[2][1]
 
     @property

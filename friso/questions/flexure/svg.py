@@ -47,7 +47,7 @@ HATCH = (
 
 
 def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
-    """Return the whole drawing [mm], with a title for readers that cannot see pictures."""
+    """Return the drawing as SVG, `width` by `height` [mm]; screen readers read the `label`."""
     size = f'width="{_n(width)}mm" height="{_n(height)}mm" viewBox="0 0 {_n(width)} {_n(height)}"'
     paper = f'<rect width="{_n(width)}" height="{_n(height)}" fill="#ffffff"/>'
     body = "\n".join([f"<title>{escape(label)}</title>", HATCH, paper, *parts])

@@ -62,7 +62,7 @@ class ExperimentSummary:
 
 @dataclass(frozen=True)
 class EstimateRow:
-    """A line of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
+    """A row of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
 
     determined: bool
     texts: tuple[str, ...]

@@ -183,7 +183,7 @@ def _least_words(tuning: Advice) -> str:
 
 
 def _of_the_drive(tuning: Advice) -> str:
-    """Say that timing in the table [drive] affects the margin alone, if the file has any."""
+    """Say that timing in the table [drive] counts for the margin alone; empty without timing."""
     has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
     return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
 

@@ -133,7 +133,7 @@ def share_with_interval(share: Share) -> str:
 
 
 def percent_range(low: float, high: float) -> str:
-    """Write two fractions in percent with one sign."""
+    """Write two fractions in percent, with one percent sign for both."""
     return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 

@@ -279,7 +279,7 @@ class _Work:
     options: int
 
     def runs(self, option: Option, before: int) -> MachineMeasures:
-        """Run an option on all machines and measure them, after `before` other options."""
+        """Run an option on all machines and measure them; `before` other options were run already."""
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)

@@ -101,7 +101,7 @@ def travel(stage: Stage) -> tuple[float, float]:
 
 
 def longest_travel(stage: Stage) -> float:
-    """Return the length [m] of the way at constant speed."""
+    """Return the length [m] of the way at constant speed, a fixed fraction of the travel."""
     low, high = travel(stage)
     return WAY * (high - low)
 

@@ -134,7 +134,7 @@ def _line_numbers(line: StraightLine) -> dict[str, Any]:
 
 
 def _drag_numbers(drag: Drag) -> dict[str, Any]:
-    """Return the friction level at low frequency, for the document."""
+    """Return mass, damping, stiffness and Coulomb friction at low frequency, for the document."""
     several = {"mass": drag.mass, "damping": drag.damping, "stiffness": drag.stiffness, "coulomb": drag.coulomb}
     return {
         **{name: estimate_document(estimate) for name, estimate in several.items()},

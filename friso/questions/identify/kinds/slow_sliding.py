@@ -30,7 +30,7 @@ def _facts(result: SlowSliding) -> Facts:
 
 
 def _numbers(result: SlowSliding) -> dict[str, Any]:
-    """Return friction over speed, for the document."""
+    """Return Coulomb and static friction and the Stribeck velocity, for the document."""
     named = {estimate.name.removeprefix("friction."): estimate_document(estimate) for estimate in result.estimates}
     return {**named, "unexplained": result.unexplained, "warnings": list(result.warnings)}
 

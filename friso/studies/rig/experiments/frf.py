@@ -74,7 +74,7 @@ class MeasuredLoop:
 
     @property
     def measured(self) -> bool:
-        """Tell whether a response was measured, so the closed loop was stable."""
+        """Tell whether there is a response, which means that the closed loop was stable."""
         return len(self.response.frequency) > 0
 
 

@@ -52,7 +52,7 @@ CASES = {"locked": True, "free": False}
 
 @dataclass(frozen=True)
 class Trace:
-    """Deviation from the end of the move [m] over `time` [s], both of shape (n,)."""
+    """Position minus the reference at its end [m] over `time` [s], both of shape (n,)."""
 
     time: np.ndarray
     deviation: np.ndarray
