@@ -537,7 +537,7 @@ def _lines(
 ) -> AnswerPart:
     """Return the shell command and the line of Python that repeat what the page shows.
 
-    Both are about the machine shown.
+    Both are about the machine shown. `function` is the function of friso to call, if it is not named as the command.
     """
     chosen = {name: value for name, value in (options or {}).items() if value is not False}
     files, options = [asked.machine.name], {**asked.machine.to_set, **chosen}
@@ -562,7 +562,8 @@ def _both_lines(
 ) -> AnswerPart:
     """Return the shell command and the Python line that repeat the page's question.
 
-    `of` says in words to which file these two lines apply. The question's name and options are returned too.
+    `of` says in words to which file these two lines apply. `function` is the function of friso to call, if it is not
+    named as the command. The question's name and options are returned too.
     """
     lines = {
         "command": command_line(command, files, options),

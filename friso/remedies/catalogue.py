@@ -84,7 +84,7 @@ class Remedy:
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """Return the stage at one point of the search, shape (variables,), in coordinates 0 to 1.
+        """Return the stage at a point of the search, `shares` with coordinates 0 to 1, (variables,).
 
         Numbers are rounded to four digits; unchanged numbers are kept exactly.
         """

@@ -82,7 +82,8 @@ def _halve(
     """Bisect between coordinates `inside` that work and `outside` that do not, changing both.
 
     Both have shape (variables, 2), for a lower and an upper end. `ends` selects the ends to refine by indices of
-    variable and side, (n, 2). `does` takes indices of variables and coordinates, both (n,), and returns which work.
+    variable and side, (n, 2), and `halvings` is how often. `does` takes indices of variables and coordinates, both
+    (n,), and returns which work.
     """
     rows, sides = ends.T
     for _ in range(halvings if len(ends) else 0):

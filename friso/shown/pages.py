@@ -128,9 +128,9 @@ def _escaped_text(value: Any) -> Any:
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """Return a figure as a data address in quotation marks; with its note if `noted`.
+    """Return a figure as a data address in quotation marks, in the format `form`.
 
-    The image is printed, and seen in browsers without scripts.
+    The image keeps its note if `noted`. It is printed, and seen in browsers without scripts.
     """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":

@@ -60,7 +60,7 @@ class Line:
 
 
 class _Row(NamedTuple):
-    """Point of a line: keys and their error as fractions of their ranges, cycle and kind."""
+    """Point of a line: its keys and their error as fractions of the ranges, its cycle and kind."""
 
     at: np.ndarray
     error: np.ndarray

@@ -164,5 +164,5 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:
-    """Return an unused, hidden path beside a store's `path`."""
+    """Return an unused, hidden path beside a store's `path`, which ends in `suffix`."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

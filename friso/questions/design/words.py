@@ -199,7 +199,10 @@ def edge(corners: Corners) -> str:
 
 
 def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
-    """Describe a corner, one extreme of all uncertain keys, by its friction and masses."""
+    """Describe a corner, an extreme of all uncertain keys, by its friction and masses.
+
+    `number` is the index of the corner, and `flat` has the keys of the stage.
+    """
     keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))

@@ -158,7 +158,7 @@ def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> lis
 def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return the outline of a leaf from above: both long edges and both ends.
 
-    Cross-sections turn as the middle line does.
+    `offset` is the leaf's height z [m]. Cross-sections turn as the middle line does.
     """
     x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
@@ -183,7 +183,8 @@ def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return a few cross-sections of a leaf between cart and stage, at rest and moved.
 
-    Along the leaf, sections turn by an evenly growing part of the turn of the stage.
+    `offset` is the leaf's height z [m]. Along the leaf, sections turn by an evenly growing part of the turn of the
+    stage.
     """
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):

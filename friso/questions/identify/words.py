@@ -131,7 +131,7 @@ def _absent(estimate: Estimate) -> bool:
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show the quantities that are not identified.
 
-    A kind in `done` is left out: why its logs were not enough is said elsewhere.
+    Kinds of experiment in `done` are left out: why their logs were not enough is said elsewhere.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:

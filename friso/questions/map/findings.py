@@ -130,7 +130,7 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
 
 
 def _percent(part: int, total: int) -> str:
-    """Write a fraction in percent; only exactly none or all is shown as 0 or 100 %."""
+    """Write `part` of `total` in percent; only exactly none or all is shown as 0 or 100 %."""
     share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"

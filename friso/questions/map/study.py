@@ -72,8 +72,8 @@ class Varied:
     ) -> Varied:
         """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-        `latin` and `log` say how keys are sampled and spaced. Raises InputError for an axis or a link that is not
-        usable.
+        The texts are `x`, `y` and those in `more`. `latin` and `log` say how keys are sampled and spaced. Raises
+        InputError for an axis or a link that is not usable.
         """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(
@@ -273,7 +273,7 @@ def _views(store: Path) -> list[Path]:
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
     """Return the files beside a store that are still as the store wrote them.
 
-    They are recognised by the digests that the store notes.
+    Looked at are figure, page and the `exports`. Files are recognised by the digests that the store notes.
     """
     noted = _noted_digests(store)
     named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}

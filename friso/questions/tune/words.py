@@ -588,7 +588,10 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 
 def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
-    """Return the texts of one row of the table: how machines perform, under `COLUMNS`."""
+    """Return the texts of one row of the table: how machines perform, under `COLUMNS`.
+
+    The first text is `works`, which says whether the remedy works.
+    """
     goal = tuning.goal
     return [
         works,

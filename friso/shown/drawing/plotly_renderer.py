@@ -258,7 +258,10 @@ def _add_panel(
     y_domain: tuple[float, float],
     links: dict[Axis, str],
 ) -> None:
-    """Add the axes of a panel; panels with equal x axes are zoomed together."""
+    """Add the axes of a panel; panels with equal x axes are zoomed together.
+
+    `x_domain` and `y_domain` are the place of the panel, as fractions of the figure.
+    """
     suffix = _suffix(number)
     shape = {"constrain": "domain"} if panel.equal else {}
     x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
@@ -331,21 +334,21 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of a filled band."""
+    """Return the trace of a filled band, on the axes in `place`."""
     x, y = band.outline
     style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
     return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of a line."""
+    """Return the trace of a line, on the axes in `place`."""
     style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of single points."""
+    """Return the trace of single points, on the axes in `place`."""
     style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
     return {**drawn, **_text(marker.label, panel), **place}

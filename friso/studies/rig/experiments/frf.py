@@ -1,6 +1,7 @@
 """Frequency responses of the plant, locked at ten places and free, and of open loops.
 
-They are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29), open loops at several crossovers.
+All are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29). The open loops are measured at several
+crossovers.
 """
 
 from __future__ import annotations
@@ -155,7 +156,7 @@ def open_loops(
 ) -> tuple[tuple[RigLog, ...], tuple[MeasuredLoop, ...]]:
     """Return logs of one excitation at several crossovers of the controller, and their loops.
 
-    `settings` are these crossovers over the stage's own.
+    The stage stands at a `place` [m]. `settings` are the crossovers over the stage's own.
     """
     factors = np.array(settings)
     recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))

@@ -164,8 +164,8 @@ def _moves_and_releases(
 ) -> tuple[dict[str, RailRuns], RailRuns]:
     """Run the move in each case (locked, free), and releases with the joint locked.
 
-    `frequencies` are crossovers [Hz], and `seeds` those of the rails. Moves have the shape (crossovers, rails),
-    releases (displacements, crossovers, rails).
+    `stages` are those of the cases, and `there` is the move. `frequencies` are crossovers [Hz], and `seeds` those of
+    the rails. Moves have the shape (crossovers, rails), releases (displacements, crossovers, rails).
     """
     stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
@@ -188,7 +188,8 @@ def _startable(
 ) -> Startable | None:
     """Return a machine that hunts after a release but not after the move, or None.
 
-    Of all such machines it has the lowest crossover, on a rail without counted peaks after the move.
+    `moved` are the outcomes of the moves and `started` those of the releases, at crossovers `frequencies` [Hz] on rails
+    with `seeds`. Of all such machines it has the lowest crossover, on a rail without counted peaks after the move.
     """
     lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))
