@@ -58,7 +58,8 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
     """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
 
-    If possible, no part is relaxed by more than a reasonable factor. Otherwise, only the bandwidth limit is not.
+    If possible, no part is relaxed by more than a reasonable factor. Otherwise, this is required of the bandwidth limit
+    only.
     """
     settings = RemedySettings.current()
     needed = _needed(points, goal)

@@ -1,4 +1,4 @@
-"""Define an optimiser's variables on logarithmic scales, and the keys that follow."""
+"""Define the variables of an optimiser, on logarithmic scales: gains, bandwidth, and joint."""
 
 from __future__ import annotations
 
