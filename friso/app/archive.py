@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
     """Return a ZIP file with everything that an answer's command would write.
 
-    It holds the files, the figures in all formats, and the answer as JSON. `more` adds texts by name.
+    The archive holds the files, the figures in all formats, and the answer as JSON. `more` adds text files by name.
     """
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)

@@ -34,8 +34,8 @@ OUT_OF_FILES = (
 class Connection(H11Protocol):
     """A connection that is closed when idle too long, or when held too long without a key.
 
-    Only so many may be open. For one more, the connection that has been idle longest is closed. A connection that
-    answers a client with a key is never closed.
+    The key is that of a session (`friso.app.gate`). If too many connections are open, the one that has been idle
+    longest is closed. A connection that answers a client with a key is never closed.
     """
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]

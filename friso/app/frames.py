@@ -1,8 +1,8 @@
 """Pack answers for the page: frames of a JSON text and of its numbers in binary.
 
-A frame begins with two whole numbers of four bytes, least significant byte first. They are the lengths of the text and
-of the numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}.
-Arrays are float32.
+A frame begins with two whole numbers of four bytes, least significant byte first: the lengths of the text and of the
+numbers, which follow. In the text, an array is an object {"array": index of its first byte, "shape": [...]}. Arrays are
+float32.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def figure_on_page(figure: Figure) -> dict[str, Any]:
 
 
 class _Arrays:
-    """The arrays of a frame, in sequence."""
+    """The numbers of a frame's arrays in binary, one array behind the other."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []

@@ -66,7 +66,8 @@ are sent to all servers of the same name, whatever their port."""
 class Access:
     """The names under which the server answers, and the secrets that let a browser in.
 
-    `hosts` holds names with the port. `token` begins the long session, and `session` is its key.
+    `hosts` holds names with the port. `token` stands in the address that friso prints, and stays valid. A browser
+    exchanges it for `session`, the key of later requests.
     """
 
     hosts: frozenset[str]
@@ -81,7 +82,8 @@ class Access:
     def at(cls, host: str, port: int) -> Access:
         """Return the access to a server at a host and port.
 
-        Names of this machine alone stand for each other, such as localhost and 127.0.0.1.
+        A host such as localhost, which means this machine alone, may also be called by its other names, such as
+        127.0.0.1.
         """
         named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
@@ -89,9 +91,9 @@ class Access:
         return cls(frozenset(hosts))
 
     def token_for_once(self) -> str:
-        """Return a token that is valid once.
+        """Return a new token that is valid once, for the address that friso opens in a browser.
 
-        Other users can see running commands, and with them the address that friso opens in a browser.
+        Other users of this machine can see its running commands, and with them this address.
         """
         token = secrets.token_urlsafe(32)
         self.once[token] = time.monotonic(), ""
@@ -100,7 +102,7 @@ class Access:
     def is_host(self, host: str) -> bool:
         """Tell whether the server goes by this name, in small or capital letters.
 
-        A request under a foreign name means that another site made its name lead to this server.
+        A request under another name means that some site has made its own name lead to this server.
         """
         return host.lower() in self.hosts
 
@@ -109,10 +111,10 @@ class Access:
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def session_of(self, token: str, key: str = "") -> str:
-        """Return the key of the session that a token begins; "" for a wrong token.
+        """Return the key of the session that a token begins; "" for a wrong, used or old token.
 
-        A token that is valid once may return from the browser that used it, with the session's key. If it returns
-        without that key, two people have seen it, and its session ends.
+        `key` is the one that the browser already has. If a token that is valid once is used again without its session's
+        key, two people have seen it: the session ends.
         """
         for own, (made, session) in self.once.items():
             if not _same(token, own):

@@ -1,6 +1,6 @@
 """Add to a figure what it is compared with.
 
-On most figures that is the pinned machine in grey, on a map the edge of hunting.
+On most figures that is the machine pinned for comparison, in grey; on a map it is the edge of hunting.
 """
 
 from __future__ import annotations
@@ -62,7 +62,10 @@ def _subject(panel: Panel) -> tuple[str, str, str]:
 
 
 def with_edge(figure: Figure, edge: Answer | None) -> Figure:
-    """Add to a map over two keys the curves on which hunting ends; None adds nothing."""
+    """Add to a map over two keys the curves on which hunting ends.
+
+    `edge` is the answer of `friso boundary`; with None the map stays as it is.
+    """
     if edge is None:
         return figure
     curves = edge.figures()[0].panels[0].series

@@ -35,7 +35,8 @@ class KeptAnswers:
     ) -> Any:
         """Return a function's answer about a machine, computed now or kept from before.
 
-        The warnings that came with a kept answer are added to the `work` again. Raises whatever the function raises.
+        `options` are those of the function. The warnings that came with a kept answer are added to the `work` again.
+        Raises whatever the function raises.
         """
         place = _place(machine, options)
         with self._turn:
@@ -55,7 +56,7 @@ class KeptAnswers:
     def holds(
         self, function: Callable[..., Answer], machine: Machine, options: Mapping[str, Any] | None = None
     ) -> bool:
-        """Tell whether a function's answer about a machine is kept."""
+        """Tell whether a function's answer about a machine, with these `options`, is kept."""
         with self._turn:
             return _place(machine, options) in self._kept.get(function, ())
 

@@ -156,7 +156,8 @@ def _key(
 ) -> dict[str, Any]:
     """Describe a key for the page: its value, kind, unit and example.
 
-    `plain` marks a certain value. A number also gets its value in SI and the range of its slider.
+    `plain` is true in the result unless the key is in `uncertain`. A number also gets its value in SI and the range of
+    its slider.
     """
     key = path.partition(".")[2]
     value, field = present.get(key), fields.get(path)

@@ -67,9 +67,9 @@ class PageRequest:
         return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
-        """Return those options in `names` that are set.
+        """Return the options of the request that have a value.
 
-        Raises InputError for other names or values.
+        Raises InputError for an option that is not in `names`, or a value that is no text, number or truth value.
         """
         for name, value in self.options.items():
             if name not in names or not isinstance(value, str | int | float | bool | None):
@@ -88,9 +88,10 @@ def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure:
 def figures_of(
     answer: Answer, beside: Callable[[Figure], Figure], some: Callable[[], Sequence[Figure]] | None = None
 ) -> AnswerPart:
-    """Return the figures of an answer without its words; `some` selects a few of them.
+    """Return the figures of an answer for the page, without the answer's words.
 
-    `beside` adds to each figure what it is compared with.
+    `some` computes the figures to show, by default all of the answer. `beside` adds to each figure what it is compared
+    with.
     """
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure)) for figure in (some or answer.figures)()]
@@ -162,9 +163,9 @@ def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield how far the run of a map's cell deviates from its reference, and what it does.
+    """Yield a figure of the error in the run of a map's cell, and sentences on the run.
 
-    The machine of the request is that of the cell.
+    The machine of the request is the one of this cell.
     """
     asked.chosen()
     ghosts = _ghosts(asked, work, friso.simulate)
@@ -176,9 +177,9 @@ def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield the verdict in one word, for the joint locked and free if the stage has one.
+    """Yield the verdict on the machine in one word, for the joint locked and free if it has one.
 
-    The verdict follows from attractors, as in a map of one or two cells.
+    It is computed as a map of one or two cells, by a search for attractors.
     """
     stage = asked.machine.stage
     key, cases = _cases(stage)
@@ -189,7 +190,7 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Yield whether the stage hunts, for every case, with its margin."""
+    """Yield whether the stage hunts, as given and with its joint locked and free, and margins."""
     options = asked.chosen(*OPTIONS["check"])
     ghosts = _ghosts(asked, work, friso.check)
     answer = KEPT.answer(friso.check, asked.machine, work, options)
@@ -481,7 +482,7 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
 
 
 def _mapped(asked: PageRequest, work: Work) -> Answer:
-    """Return the map with the most cells, for its files.
+    """Return the map with the most cells that the page shows, for writing its files.
 
     The edge of hunting belongs to the command boundary and is left out.
     """
@@ -536,7 +537,7 @@ def _lines(
 ) -> AnswerPart:
     """Return the shell command and the line of Python that repeat what the page shows.
 
-    Both are about the machine shown.
+    Both are about the machine shown. `function` is the function of friso to call, if it is not named as the command.
     """
     chosen = {name: value for name, value in (options or {}).items() if value is not False}
     files, options = [asked.machine.name], {**asked.machine.to_set, **chosen}
@@ -561,7 +562,8 @@ def _both_lines(
 ) -> AnswerPart:
     """Return the shell command and the Python line that repeat the page's question.
 
-    `of` names in words what they apply to. The question's name and options are returned too.
+    `of` says in words to which file these two lines apply. `function` is the function of friso to call, if it is not
+    named as the command. The question's name and options are returned too.
     """
     lines = {
         "command": command_line(command, files, options),
@@ -604,9 +606,10 @@ def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
-    """Return a key and, for each case, the value of this key: the joint locked or free.
+    """Return a key, and its value in each case that is asked about.
 
-    A stage without a joint has one case, "given". Its key is a mass, with its present value.
+    For a stage with a joint, the key locks the joint, and the cases are "locked" and "free". Without a joint, the only
+    case is "given", and the key is a mass with its present value.
     """
     if stage.joint is not None:
         values = {"locked": True, "free": False}

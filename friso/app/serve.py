@@ -42,8 +42,9 @@ TRIES = 20
 def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
     """Print the address of the page and serve it until interrupted.
 
-    With `browser`, the address is also opened. Raises InputError for a stage file that cannot be read, or if no port is
-    free. A host that others can reach is refused unless `insecure` is set.
+    The page begins with the file `stage`, or with an example. With `browser`, the address is also opened. Raises
+    InputError for a stage file that cannot be read, or if no port is free. A host that others can reach is refused
+    unless `insecure` is set.
     """
     file = example("thesis_rig") if stage is None else stage
     load(file)

@@ -36,8 +36,8 @@ PLOTLY = "/plotly.js"
 def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> ASGIApp:
     """Build the web application of the page; all but its public files need a key.
 
-    `begin` holds the name and text of the first stage file, and whether the user asked for that file. When the server
-    ends, questions in progress are stopped and uploads are deleted.
+    `begin` holds the name and text of the first stage file, and whether the user asked for that file. `access` decides
+    who is let in. When the server ends, questions in progress are stopped and uploads are deleted.
     """
     uploads = Uploads()
 

@@ -26,8 +26,8 @@ PREFIX = "friso-uploads-"
 class Uploads:
     """Dropped files by the names under which the page knows them.
 
-    The page can name no other file. Names are random, so a page left open cannot reach files of a later server. The
-    next server deletes what a killed one left behind.
+    The page can name no file that was not dropped. Names are random, so a page left open cannot reach files of a later
+    server. Files that a killed server left behind are deleted by the next one.
     """
 
     def __init__(self) -> None:

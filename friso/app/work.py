@@ -100,7 +100,7 @@ class Work:
 class Messages(logging.Handler):
     """A log handler that sends each message to the question that caused it.
 
-    Messages stay below the answer, except those on the compilation of kernels.
+    Messages stay on the page below the answer, except those on the compilation of kernels.
     """
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -142,8 +142,9 @@ class Workshop:
     ) -> AsyncIterator[bytes]:
         """Yield the frames of an answer as they come. The work ends when the reader stops.
 
-        The question ends an older one of the `page` on this `lane`. A `quick` question computes nothing and does not
-        wait for others. All others wait for the first part of a question that goes `first`.
+        The question ends an older one of the `page` on this `lane`, which has a smaller `number`. A `quick` question
+        computes nothing and does not wait for others. All others wait for the first part of a question that goes
+        `first`.
         """
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 

@@ -84,7 +84,7 @@ class Remedy:
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """Return the stage at one point of the search, shape (variables,), in coordinates 0 to 1.
+        """Return the stage at a point of the search, `shares` with coordinates 0 to 1, (variables,).
 
         Numbers are rounded to four digits; unchanged numbers are kept exactly.
         """
@@ -173,7 +173,7 @@ def _structures(stage: Stage) -> Iterator[Remedy]:
 
 
 def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
-    """Return a stage with other keys of its controller.
+    """Return a stage with changed keys of its controller.
 
     Changes are numbers [SI], texts, or None to remove a key.
     """
@@ -198,9 +198,10 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
 
 
 def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Yield an isolator as a remedy, with the present gains and with changed ones.
+    """Yield the isolators as remedies: one with the present gains, one with changed gains.
 
-    Leaf springs of the stage file are replaced by a joint with plain numbers.
+    Leaf springs of the stage file are replaced by a joint with plain numbers. Nothing is yielded for a stage that
+    cannot have a free joint.
     """
     try:
         free = isolated(stage)

@@ -21,7 +21,8 @@ class ChangeSize:
     """The size of a change, which orders changes from small to large.
 
     Changes are compared first by whether a part is `bought`, then by the number of `keys` of the controller that
-    change. Last comes the `factor`: the product of the factors by which `scaled` numbers change.
+    change. Last comes the `factor`, the product of the factors by which numbers change. `scaled` is how many numbers
+    change by a factor; it is not compared.
     """
 
     bought: bool
@@ -36,7 +37,7 @@ class ChangeSize:
 
 
 def change_size(before: Stage, after: Stage) -> ChangeSize:
-    """Measure how much one stage changes into another: parts bought, keys, and factors."""
+    """Measure how large the change from one stage to another is: parts bought, keys, factors."""
     old, new = before.flat(), after.flat()
     bought = any(_differ(old.get(key), new.get(key)) for key in {*old, *new} if key.startswith(PARTS))
     keys = [key for key in {*old, *new} if key.startswith(f"{CONTROLLER}.") and _differ(old.get(key), new.get(key))]
@@ -45,9 +46,10 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
 
 
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
-    """Return the size of a change of a number, as the logarithm of a factor.
+    """Return the size of a number's change, as the natural logarithm of its factor.
 
-    Upward and downward changes count alike. The result is 0 if there was no number before.
+    Upward and downward changes count alike. The result is 0 for words, and for a number that was or becomes 0 or
+    changes its sign.
     """
     before, after = old.get(key), new.get(key)
     if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:

@@ -21,9 +21,9 @@ class Confirmation:
     """Result of searching for hunting at a stage's own bandwidth and at nearby ones.
 
     `hunting` are the limit cycles of the `stage` itself, searched as thoroughly as `friso check` does. `word` is the
-    verdict on the stage's own motion from fewer starts; None if that takes too much work. `factors` are other
-    bandwidths as multiples of its own, and `quiet` is true where it certainly does not hunt. `unstable` are the states
-    in which its loop is unstable.
+    verdict on the stage's own motion from fewer starts; None if that takes too much work. `factors` are the other
+    bandwidths, as multiples of the stage's own; `quiet` is true at those at which the stage certainly does not hunt.
+    `unstable` are the states in which the loop of the stage is unstable.
     """
 
     stage: Stage

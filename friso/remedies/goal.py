@@ -24,9 +24,9 @@ class Goal:
     `force_limit` [N]; None means any force. The bandwidth must not exceed `bandwidth_limit` [Hz]; None means that only
     the stage file limits it.
 
-    `moves` None stands for the moves of the stage. The limit cases, and all states stuck under a bias force, must keep
-    the modulus `margin`. Hunting must be a factor `distance` in bandwidth away. `controller` and `joint` are true if
-    these parts may change.
+    `moves` is the range of moves; None means those of the stage. The limit cases, and all states stuck under a bias
+    force, must keep the modulus `margin`. The machine must not hunt at its bandwidth, nor at bandwidths up to the
+    factor `distance` away. `controller` and `joint` are true if these parts may change.
     """
 
     within: float = 1e-6
@@ -47,7 +47,7 @@ class Goal:
     def surely(self, machines: int) -> float:
         """Return the fraction of a sample of machines that must meet the goal.
 
-        It is one standard error above the fraction required of all machines. Otherwise, half of the settings at the
-        limit would pass.
+        This fraction is one standard error above the one required of all machines. Otherwise, half of the settings at
+        the limit would pass.
         """
         return min(1.0, self.share + float(np.sqrt(self.share * (1 - self.share) / machines)))

@@ -29,8 +29,8 @@ of the search, so other machines may need more."""
 def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
     """Return a remedy that varies each changed key of the controller separately.
 
-    Each key ranges from its value `before` to its `tuned` value, and slightly beyond. Everything else is as `tuned`.
-    Returns None if no key of the controller changed.
+    The range of a key is from its value `before` to its `tuned` value, and slightly beyond. Everything else is as
+    `tuned`. Returns None if no key of the controller changed.
     """
     old, new = before.flat(), tuned.flat()
     variables = [
@@ -82,9 +82,9 @@ def least_changes(search: Search, most: float = np.inf) -> Iterator[np.ndarray]:
 def of_one_key(search: Search, most: float = np.inf, enough: float | None = None) -> Iterator[np.ndarray]:
     """Yield changes of a single variable that work, the smallest first, all smaller than `most`.
 
-    They break no constraint, the fraction `enough` of the fresh machines meets the goal, and enough surveyed machines
-    do not hunt (`Search.clear`). With `enough`, values between grid points are not tried, so the first answer has a
-    reserve.
+    They break no constraint, and enough surveyed machines do not hunt (`Search.clear`). The fraction `enough` of the
+    fresh machines meets the goal; by default, one standard error more than the goal requires. By default, smaller
+    changes between grid points are tried, too. With `enough` they are not, so the first answer has a reserve.
     """
     settings = RemedySettings.current()
     wanted = partial(change_costs, search.remedy)
@@ -111,7 +111,7 @@ def _robust(search: Search, points: np.ndarray, enough: float | None = None) -> 
     """Yield the points (points, variables) that work on fresh machines, without hunting.
 
     Enough surveyed machines must not hunt (`Search.clear`). At least the fraction `enough` of the fresh machines must
-    meet the goal by moves and margins. By default, it lies one standard error above the fraction required of all
+    meet the goal by moves and margins. By default, this fraction lies one standard error above the one required of all
     machines.
     """
     settings = RemedySettings.current()
@@ -138,7 +138,8 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 def size_cost(keys: Any, logarithm: Any) -> np.ndarray:
     """Return the size of a change as a number, to compare changes.
 
-    Its integer part is the number of keys; its fraction grows with the `logarithm` of the product of all factors.
+    The integer part of the result is the number of `keys`. Its fraction grows with the `logarithm` of the product of
+    all factors.
     """
     return np.asarray(keys + logarithm / (1 + logarithm))
 
@@ -164,8 +165,9 @@ def _ends(remedy: Remedy) -> np.ndarray:
 def candidates(search: Search) -> Iterator[np.ndarray]:
     """Yield settings to verify, as points of shape (variables,), the smallest change first.
 
-    They are the smallest change tried that breaks no constraint, the same change taken further, points between it and
-    the working settings, then other points tried. Points that work on fresh machines come before all others.
+    First come settings that work on fresh machines: the smallest change tried that breaks no constraint, this change
+    taken further, points between it and the working settings, and other small changes tried. The best of all points
+    tried follow (`Search.surveyed`).
     """
     settings = RemedySettings.current()
     wanted, points = partial(change_costs, search.remedy), search.points

@@ -82,9 +82,9 @@ class Fleet:
     """Machines drawn around a stage, as changes of its keys, all of shape (count,).
 
     `ratios` multiply a key on each machine, and `shifts` are added to keys that are 0. `sizes` [m] are the moves of the
-    machines; `accelerations` [m/s^2] are given if they differ from the file's. `moves` is the range from which both
-    were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads` [%] the default spreads of other
-    keys. `left_out` counts invalid draws, which were replaced.
+    machines. `accelerations` [m/s^2] are those of the moves, None if all have the file's. `moves` is the range from
+    which sizes and accelerations were drawn. `from_file` lists the keys that the file calls uncertain, and `spreads`
+    [%] the default spreads of other keys. `left_out` counts invalid draws, which were replaced.
     """
 
     ratios: Mapping[str, np.ndarray]
@@ -133,15 +133,18 @@ class Fleet:
         return {**flat, **self._motion(flat, points)}
 
     def _motion(self, flat: Mapping[str, Any], points: int) -> dict[str, Any]:
-        """Return the keys of the motion with which machines make their own moves, at all points."""
+        """Return the keys `flat` with the motion changed so that machines make their own moves.
+
+        Changed keys are arrays with one value for each point and machine, the machines of the first point first.
+        """
         faster = {} if self.accelerations is None else {ACCELERATION: np.tile(self.accelerations, points)}
         moved = {**flat, **{key: value for key, value in faster.items() if key in flat}}
         return {**moved, **motion_of(flat).stretched(moved, np.tile(self.sizes, points) / size(moved))}
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """Return the keys of each machine as factors on the stage's, for keys that the stage has.
+        """Return by which factor each machine differs from the stage, as arrays (count,) by key.
 
-        Both parts of a split mass vary with the whole mass.
+        Only keys that the stage has are returned. Both parts of a split mass get the factor of the whole mass.
         """
         ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
         masses = [key for key in self.ratios if key.startswith("masses.")]

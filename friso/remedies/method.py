@@ -57,11 +57,13 @@ room for a second one from leaf springs; an extra package is missing; or no usua
 class Advice:
     """Results of all remedies for a stage, in the order of the catalogue.
 
-    `case` is the check of the stage, and `present` its performance on machines. `unmet` are the parts of the goal that
-    it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits` gives the bandwidths with
-    enough margin, and `sensitivities` the derivatives of the edge of hunting. `relaxed` tells which parts of the goal
-    to relax if nothing works; `relaxed_all` is true if all of these were tried. `interrupted` is true if the search was
-    ended early, and `least_sought` if the smallest change was searched before that.
+    `case` is the check of the stage, and `present` the performance of the stage as it is on machines. `unmet` are the
+    parts of the goal that it misses or may miss, by names of `friso.questions.tune.present_words.DOUBTS`. `limits`
+    gives the bandwidths with enough margin, and `sensitivities` the derivatives of the edge of hunting.
+
+    `relaxed` tells which parts of the goal to relax if nothing works; `relaxed_all` is true if all remedies were
+    considered for that. `interrupted` is true if the search was ended early, and `least_sought` if the smallest change
+    was searched before that.
 
     The tables `as_built` are not used in the search; they and the `correlations` are added to stage files that are
     written. `unmade` gives the reason why no leaf springs make the joint of a remedy.
@@ -292,8 +294,8 @@ def machines_of_search(
 ) -> Fleet:
     """Return the machines on which searches try settings.
 
-    A machine far less robust than nearly all others would weigh too much in so small a sample: it is left out, and
-    another one counts twice. Sampling and delay come from the stage `drive`.
+    In so small a sample, a machine far less robust than nearly all others would weigh too much. It is left out, and
+    another machine counts twice. Sampling and delay come from the stage `drive`.
     """
     settings = RemedySettings.current()
     machines = draw_fleet(stage, correlations, settings.machine_factor * budget.machines, seed, goal.moves)
@@ -433,10 +435,10 @@ class _Session:
     def tries_less(self) -> None:
         """Search once for the smallest change of the present controller.
 
-        The search starts from the working remedy of this controller that changes most. A second search starts from the
-        one that changes least, if it still is the smallest. If no change of this controller works, it starts from the
-        smallest of the other changes. If the result leaves keys unchanged, the remaining keys are searched again, and
-        that result is taken if it changes less.
+        The search starts from the working remedy of this controller that changes most. If it finds nothing smaller than
+        the smallest change so far, a second search starts from that change. If no change of this controller works, the
+        search starts from the smallest of the other changes. If a result leaves some keys unchanged, the others are
+        searched again, and the new result is taken if it changes less.
         """
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
@@ -565,9 +567,9 @@ class _Session:
     def _verified(self, search: Search, shares: np.ndarray, moves_from: float | None = None) -> RemedyOutcome:
         """Measure settings on fresh machines; verify them by limit cycles if enough meet the goal.
 
-        `shares` are their coordinates. The machines make all moves, or those from `moves_from` [m] on. The interval of
-        the fraction of machines that meet the goal must lie at the required fraction or above. While the interval
-        leaves that open, further machines are measured.
+        `shares` are the coordinates of the settings. The machines make all moves, or those from `moves_from` [m] on.
+        The interval of the fraction of machines that meet the goal must lie at the required fraction or above. While
+        the interval leaves that open, further machines are measured.
         """
         settings = RemedySettings.current()
         remedy, goal = search.remedy, search.goal

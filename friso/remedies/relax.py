@@ -38,8 +38,8 @@ class RelaxedGoal:
 def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) -> tuple[RelaxedGoal, ...]:
     """Return the cheapest relaxation for each set of parts of the goal, the smallest first.
 
-    Only sets with the fewest parts are returned. The distance from hunting is never relaxed: at the points considered,
-    no surveyed machine hunts. If an allowance of work is used up, remedies that come later are left out.
+    Only sets with the fewest parts are returned. The distance from hunting is never relaxed: surveyed machines do not
+    hunt at the points considered. If an allowance of work is used up, the remaining remedies are left out.
     """
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     with suppress(Exhausted):
@@ -58,7 +58,8 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
     """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
 
-    If possible, each part is relaxed by a reasonable factor only; otherwise at least the bandwidth limit.
+    If possible, no part is relaxed by more than a reasonable factor. Otherwise, this is required of the bandwidth limit
+    only.
     """
     settings = RemedySettings.current()
     needed = _needed(points, goal)
@@ -77,7 +78,8 @@ def _within(
 ) -> Iterator[RelaxedGoal]:
     """Yield the cheapest relaxations for a remedy, of as few parts of the goal as possible.
 
-    The parts `limited` may only be relaxed by a reasonable factor. `needed` has the factors that each point needs.
+    `needed` has, by part, the factor by which each of the `points` must be relaxed. Parts in `limited` may not be
+    relaxed by more than a reasonable factor. A few of the `machines` must not hunt at a point.
     """
     settings = RemedySettings.current()
     needed = {name: values.copy() for name, values in needed.items()}
@@ -133,8 +135,8 @@ def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], go
 def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
     """Return the factors by which the tolerance must be wider at points, shape (points,).
 
-    A few factors are tried. The first with which the machines settle within the goal's time is taken, or else the
-    looser tolerance of the search.
+    A few factors are tried. The first with which the machines settle within the goal's time is taken. If there is none,
+    it is the factor of the looser tolerance of the search.
     """
     settings = RemedySettings.current()
     factors = np.full(len(shares), settings.looser_tolerance)
@@ -152,7 +154,10 @@ def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet)
 
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
-    """Return for each part of the goal by which factor it must be relaxed at each point."""
+    """Return by which factor each part of the goal must be relaxed at each point, shape (n,).
+
+    Factors are by the names of parts. A part that a point meets has a factor of at most 1.
+    """
     settings = RemedySettings.current()
     none = np.zeros(len(points.margin))
     limit = goal.bandwidth_limit
@@ -168,8 +173,8 @@ def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
 
 
 def _time(points: TriedPoints) -> np.ndarray:
-    """Return the settling time [s] of points within the tolerance.
+    """Return the settling time [s] of each point, shape (n,).
 
-    A point that does not settle within it has the time within the looser tolerance.
+    It is the time to settle within the tolerance or, for points that do not, within the looser tolerance of the search.
     """
     return np.where(np.isfinite(points.settling), points.settling, points.looser)

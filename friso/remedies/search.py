@@ -47,10 +47,10 @@ class Budget:
 class TriedPoints:
     """The settings that were tried, one point in each row, and how the machines performed.
 
-    `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Settling
-    times [s] hold for the fraction `goal.share` of the machines. They are `settling` within the tolerance, and `looser`
-    within a looser one. `slower` is for the looser one, too, at a bandwidth lower by the distance from hunting. Largest
-    force [N] and least modulus margin hold for the same fraction.
+    `shares` are coordinates from 0 to 1 over the ranges, (n, variables); all other arrays have shape (n,). Three
+    settling times [s] hold for the fraction `goal.share` of the machines: `settling` within the tolerance, `looser`
+    within a looser one, and `slower` within the looser one at a bandwidth lower by the distance from hunting. Largest
+    force [N] and least modulus margin hold for this fraction, too.
 
     The bandwidth [Hz] is that of the stage file's machine, where its loop last crosses 0 dB. `nearness`, from 0 to 1,
     grows with the number of machines that settle or nearly settle. `moves_from` [m] is the smallest move from which all
@@ -81,7 +81,7 @@ class TriedPoints:
         return TriedPoints(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
-        """Return for each part of the goal, by name, which points break it."""
+        """Return for each part of the goal, by name, which points break it, shape (n,)."""
         return {
             "bandwidth": np.isfinite(_most(goal.bandwidth_limit)) & ~(self.bandwidth <= _most(goal.bandwidth_limit)),
             "margin": self.margin < goal.margin,
@@ -98,7 +98,8 @@ class TriedPoints:
     def for_large_moves(self, goal: Goal, largest: float) -> np.ndarray:
         """Return the indices of points that serve only the larger moves, up to `largest` [m].
 
-        They break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes first.
+        Such points break no constraint on margin, bandwidth and force. The point that serves the smallest moves comes
+        first.
         """
         broken = self.broken(goal)
         some = self.moves_from <= largest / RemedySettings.current().large_share
@@ -106,7 +107,7 @@ class TriedPoints:
         return np.lexsort((self.looser, np.where(some, self.moves_from, np.inf)))[: np.count_nonzero(some)]
 
     def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
-        """Return the cost of points: the settling time, or the quantity `wanted` if given.
+        """Return the cost of points, (n,): the settling time, or the quantity `wanted` if given.
 
         Points that break constraints cost more than all others, the more they break them.
         """
@@ -127,7 +128,7 @@ def _most(limit: float | None) -> float:
 
 @np.errstate(over="ignore")  # forces that are not finite are excluded elsewhere
 def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
-    """Return by which fraction values exceed a limit; 0 if they do not."""
+    """Return by which fraction values exceed a limit; 0 if they do not, or if there is none."""
     return np.maximum(0, values / _most(limit) - 1)
 
 
@@ -135,7 +136,7 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 class Search:
     """Search for the best settings of a remedy, called points, on `machines`.
 
-    Points that it returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
+    Points that the search returns must also work on `fresh` machines. `tried` has all points so far. `attracted` counts
     surveyed points at which machines hunt, or may hunt. `cut` is true if the search took too much work.
     """
 
@@ -187,7 +188,7 @@ class Search:
     def looked_at(self, points: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
         """Yield points (variables,) for closer study, until finding one takes too much work.
 
-        The search is then marked as `cut`.
+        The search is marked as `cut` in that case.
         """
         settings = RemedySettings.current()
         left = settings.looking_work * self._work
@@ -293,12 +294,14 @@ class Search:
     ) -> TriedPoints:
         """Simulate moves of the machines with each of several settings, and return how they perform.
 
-        Moves are simulated only if the loop is stable with half of the margin required. A remedy of several variables
-        must also not exceed the bandwidth limit by far. Other moves chatter and take most of the work.
+        `shares` are the settings, as points (points, variables). Moves are simulated only if the loop is stable with
+        half of the margin required. A remedy of several variables must also not exceed the bandwidth limit by far.
+        Other moves chatter and take most of the work.
 
         A point is nearer to settling the more machines settle: within the tolerance, within the looser one, and within
         the looser one at the lower bandwidth. So progress shows before any machine is in position. A point is stopped
-        as soon as it must cost more than `most`. The machines that are slowest most often are tried first.
+        as soon as it must cost more than `most`, where cost is settling time or the quantity `wanted`. The machines
+        that are slowest most often are tried first.
         """
         settings = RemedySettings.current()
         goal, count, machines = self.goal, len(shares), self.machines.count
@@ -349,7 +352,8 @@ class Search:
     def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
         """Return the settings of a batch that meet the goal once all machines were run.
 
-        The best come first: they settle soonest, or have the least `wanted`.
+        Both batch and result are points (points, variables). The best come first: they settle soonest, or have the
+        least `wanted`.
         """
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
@@ -393,7 +397,9 @@ class Search:
         Settings are points of shape (variables,). Points that settle soonest, or have the least of the quantity
         `wanted`, come first. Enough fresh machines must meet the goal. Nearly equal points count as one. After a batch
         without success, the next points are taken farther away, because the best points are often at the limit of what
-        works. If no point has enough fresh machines, the one with the most is yielded.
+        works.
+
+        If no point has enough fresh machines, the one with the most is yielded, unless surveyed machines hunt there.
         """
         settings = RemedySettings.current()
         points = self.begun
@@ -438,9 +444,9 @@ class Search:
     def _closer(self, point: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> list[np.ndarray]:
         """Return better settings near a point (variables,), the best first.
 
-        The best settle soonest, or have the least `wanted` if given. The point was taken because better ones failed:
-        there machines hunted, or too few met the goal. New points are chosen at random around the point, then around
-        the point taken next.
+        The best settle soonest, or have the least `wanted` if given. The `point` was taken because better ones failed:
+        there machines hunted, or too few met the goal. New points are drawn at random around it. Once a better one
+        works, further points are drawn around that one.
         """
         settings = RemedySettings.current()
         goal, closer = self.goal, list[np.ndarray]()
@@ -549,7 +555,10 @@ def _agree(intermediate_result: Any) -> bool:
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
-    """Return the first points, at most `most`, each more than `apart` from all others returned."""
+    """Return the first points, at most `most`, each farther than `apart` from all others taken.
+
+    The distance of two points is the largest difference of a coordinate.
+    """
     chosen: list[np.ndarray] = []
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):

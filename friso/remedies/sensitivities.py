@@ -195,7 +195,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Return a stage's flat keys, changed so little that its equations contain all given `keys`.
+    """Return a stage's flat keys, some slightly changed so that equations contain all `keys`.
 
     An exponent that is a whole number, for example, would otherwise be built in as a constant. Raises InputError for a
     key that equations never contain.
@@ -232,7 +232,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     """Return the derivatives of the settling time into the band `within` [m], by the keys.
 
     A derivative is the change of position where the stage last enters the band, over its speed there. Returns None if
-    the time is not smooth, since neighbouring motions do not follow.
+    the stage does not settle in its run, or if the time does not change smoothly with the keys.
     """
     if not rests(flat):
         return None
@@ -284,9 +284,9 @@ def _is_smooth(
 ) -> bool:
     """Tell whether the settling time changes smoothly with each key.
 
-    The stage `entered` the band at a time [s], after `settling` [s], in a run `until` [s]. Keys are changed a little
-    either way, and the new times are compared with what the derivatives `by` predict. Times and predictions differ if
-    the stage bounces on its limiter so often that neighbouring motions diverge.
+    The stage `entered` the band for the last time at a time [s], after `settling` [s]; its run lasts `until` [s]. Keys
+    are changed a little either way, and the new times are compared with what the derivatives `by` predict. Times and
+    predictions differ if the stage bounces on its limiter so often that neighbouring motions diverge.
     """
     settings = RemedySettings.current()
     step = settings.loop_change * np.array([flat[name] for name in keys])

@@ -40,8 +40,8 @@ class Suggestion:
 def suggestion(stage: Stage) -> Suggestion | None:
     """Return the isolator with the shortest of a few strokes that settles a stage.
 
-    At its stroke it pushes with a fixed fraction of static friction, so that the cart does not move. If none settles
-    the stage, the last one tried is returned. Returns None for a stage that has a joint or cannot have one.
+    At full stroke, an isolator pushes with a fixed fraction of static friction, so that the cart does not move. If none
+    settles the stage, the last one tried is returned. Returns None for a stage that has a joint or cannot have one.
     """
     settings = RemedySettings.current()
     if stage.joint:

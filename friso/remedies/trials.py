@@ -34,7 +34,7 @@ class Moves:
 
     `settling` [s] is the time until the stage stays within the tolerance (see `friso.hunting.criteria.settling`), and
     `looser` [s] the time for the looser tolerance. Both are infinite if the stage is not in position when the reference
-    leaves or the run ends. `force` [N] is the largest force.
+    moves on or the run ends. `force` [N] is the largest force.
     """
 
     settling: np.ndarray
@@ -104,7 +104,8 @@ class Attraction:
     """Which machines hunt at which points, as arrays of shape (points, machines).
 
     `attracts` is true if a machine hunts at its bandwidth, or at one lower by up to the goal's distance. `decided` is
-    true if the simulations sufficed to say so, and `certain` if in addition no other attractor can exist.
+    true if the simulations sufficed to say so. `certain` is true if, in addition, nothing can attract that no
+    simulation starts from.
     """
 
     attracts: np.ndarray
@@ -147,8 +148,10 @@ def attraction(
 
     Each machine is surveyed at the point's bandwidth and at lower ones, down to the goal's distance. The lowest
     bandwidth comes first, because most machines hunt there; or all come `at_once`, which is faster if hardly any
-    machine hunts. An undecided bandwidth ends the survey of a machine. A point ends with fewer than the fraction
-    `enough` of quiet machines. Simulations start from many states; closed orbits confirm the final answer.
+    machine hunts.
+
+    An undecided bandwidth ends the survey of a machine. The survey of a point ends once fewer than the fraction
+    `enough` of its machines are still quiet. Simulations start from many states; no orbits are closed.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

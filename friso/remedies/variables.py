@@ -1,4 +1,4 @@
-"""Define an optimiser's variables on logarithmic scales, and the keys that follow."""
+"""Define the variables of an optimiser, on logarithmic scales: gains, bandwidth, and joint."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DAMPING_RATIOS = (0.01, 0.3)
 class Variable:
     """A number between `low` and `high` (SI) on a logarithmic scale.
 
-    Close to the `present` number it takes exactly that value; NaN means that there is none.
+    Close to the `present` value, the number takes exactly that value; NaN means that there is none.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Variable:
 def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
     """Return a key of the stage file as a variable between `low` and `high`.
 
-    It takes exactly the `present` value close to it; NaN means that there is none.
+    Close to the `present` value, the variable takes exactly that value; NaN means that there is none.
     """
     return Variable(key, low, high, lambda flat, value: {key: value}, present)
 
@@ -75,7 +75,7 @@ def gains(stage: Stage) -> tuple[Variable, ...]:
 def joint_variables(friction: float) -> tuple[Variable, ...]:
     """Return stroke, stiffness and damping of an isolator as variables.
 
-    Their ranges follow from the least static `friction` [N].
+    The ranges of the variables follow from the least static `friction` [N].
     """
 
     settings = RemedySettings.current()

@@ -90,7 +90,7 @@ class Performance:
         return float(-quantile(-self.margin, goal.share)[0])
 
     def meets(self, goal: Goal) -> Mapping[str, np.ndarray]:
-        """Return for each part of the goal which machines meet it."""
+        """Return for each part of the goal, by name, which machines meet it, shape (count,)."""
         late = np.inf if goal.settle is None else goal.settle
         most = np.inf if goal.force_limit is None else goal.force_limit
         return {
@@ -113,8 +113,9 @@ class Performance:
     def held_moves(self, goal: Goal) -> tuple[float, float] | None:
         """Return the smallest and largest move [m] between which the goal holds, or None.
 
-        Of the moves next to either end, however many are taken, at least the required fraction meets the goal. The
-        result is None if there are no such moves, or if the moves are unknown or were not surveyed for hunting.
+        Counted inwards from either end of this range, at least the required fraction of the moves meets the goal,
+        however many are counted. The result is None if there is no such range, if the moves are unknown, or if machines
+        were not surveyed for hunting.
         """
         order = np.argsort(self.sizes, kind="stable")
         if self.moves_drawn is None or not order.size or not self.is_surveyed:
@@ -128,14 +129,18 @@ class Performance:
         return float(low), float(high)
 
     def holds_for_all_moves(self, goal: Goal) -> bool:
-        """Tell whether the goal holds for all moves that were drawn, but for a few at the ends that chance may miss."""
+        """Tell whether the goal holds over a range with the required fraction of the moves drawn.
+
+        The few moves beyond its ends may miss the goal by chance. The result is also true if it is not known from which
+        range the moves were drawn.
+        """
         if self.moves_drawn is None:
             return True
         held = self.held_moves(goal)
         return held is not None and bool(np.mean((self.sizes >= held[0]) & (self.sizes <= held[1])) >= goal.share)
 
     def _all_meeting(self, goal: Goal) -> np.ndarray:
-        """Return which machines meet the whole goal, the further ones last."""
+        """Return which machines meet the whole goal, the further ones last, shape (machines,)."""
         return np.append(self._meets_all(goal), self.further)
 
     def _meets_all(self, goal: Goal) -> np.ndarray:
@@ -149,8 +154,8 @@ class Performance:
     def surveyed(self, stage: Stage, machines: Fleet, goal: Goal) -> Performance:
         """Survey machines for hunting, and return the performance with the results.
 
-        Only machines that meet all other parts of the goal are surveyed, a few of them first. If so many of these hunt
-        that too few can meet the goal, the others are left out: the fraction is then one of fewer machines.
+        Only machines that meet all other parts of the goal are surveyed, some of them first. If so many of these hunt
+        that too few machines can meet the goal, the survey ends: the result then has the first machines only.
         """
         first, others = np.split(np.arange(machines.count), [machines.count // RemedySettings.current().survey_parts])
         measured = replace(self, is_surveyed=True)._surveyed(stage, machines, first, goal)
@@ -192,8 +197,9 @@ class Performance:
 def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     """Return the first and last index of the stretch of moves that best meets the goal.
 
-    `meets` is true where a move meets it, in ascending order of moves. Any part of the stretch at either of its ends
-    has at least the required fraction `share`. Returns None if no stretch is long enough to show that.
+    `meets` is true where a move meets the goal, in ascending order of moves. Counted inwards from either end of the
+    stretch, at least the fraction `share` meets it, however many moves are counted. Returns None if no stretch is long
+    enough to show that.
     """
     if meets.all():
         return 0, len(meets) - 1
@@ -208,9 +214,9 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 class RemedyOutcome:
     """Outcome of a remedy: its best `stage`, how machines perform with it, and whether it works.
 
-    `stage` is None if none was found. `doubts` are the reasons why it is not sure to work; if there are none, it works.
-    `windows` give how far each number may vary. `confirmation` is the search for hunting of the stage itself; None if
-    too many machines miss the goal.
+    `stage` is None if no settings were good enough. `doubts` are the reasons why the remedy is not sure to work;
+    without any, it works. `windows` give how far each number may vary. `confirmation` is the search for hunting of the
+    stage itself; None if too many machines miss the goal.
 
     `points` are all settings tried; `attracted` counts the settings dropped because machines hunted. `shares` are the
     coordinates of the stage in the remedy's ranges. `cut` is true if the search took too much work, and `untried` if
@@ -314,9 +320,9 @@ def unsettled_parts(confirmation: Confirmation, measured: Performance, goal: Goa
 
 
 def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
-    """Return the parts of the goal that too many machines miss.
+    """Return the parts of the goal, by name, that too many machines miss.
 
-    If it is no single part, but all together that too many miss, the result is "together".
+    If enough machines meet each part, but too few meet all parts together, the only name is "together".
     """
     parts = measured.meets(goal)
     listed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]

@@ -17,8 +17,8 @@ from friso.remedies.settings import RemedySettings
 class VariableWindow:
     """Range of a variable around its tuned `value`, in which machines meet the goal.
 
-    The range is from `low` to `high`. All three are in SI, or factors; everything else is as tuned. `open_below` and
-    `open_above` are true if the range reaches an end of the search.
+    The range is from `low` to `high`. These and `value` are in SI, or factors on the bandwidth. All other variables
+    stay as tuned. `open_below` and `open_above` are true if the range reaches an end of the search.
     """
 
     name: str
@@ -81,8 +81,9 @@ def _halve(
 ) -> None:
     """Bisect between coordinates `inside` that work and `outside` that do not, changing both.
 
-    Both have shape (variables, 2), for a lower and an upper end. `does` tells which coordinates work. `ends` selects
-    the ends to refine by indices of variable and side, (n, 2).
+    Both have shape (variables, 2), for a lower and an upper end. `ends` selects the ends to refine by indices of
+    variable and side, (n, 2), and `halvings` is how often. `does` takes indices of variables and coordinates, both
+    (n,), and returns which work.
     """
     rows, sides = ends.T
     for _ in range(halvings if len(ends) else 0):
@@ -92,9 +93,10 @@ def _halve(
 
 
 def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Tell whether points meet the goal by moves and margins, each with one variable moved.
+    """Tell which points meet the goal by moves and margins, shape (n,).
 
-    `numbers` (n,) are the indices of the variables, and `places` (n,) their new coordinates from 0 to 1.
+    Each is a copy of the point `shares` with one variable moved. `numbers` (n,) are the indices of the variables, and
+    `places` (n,) their new coordinates from 0 to 1.
     """
     worst = RemedySettings.current().worst_time  # points that break a constraint cost more
     return search.measured(_moved(shares, numbers, places), worst).meets(search.goal)
@@ -103,8 +105,8 @@ def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.n
 def _clear(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Tell at which points enough surveyed machines do not hunt (`Search.clear`), shape (n,).
 
-    Each point has one variable moved: `numbers` (n,) are the indices of the variables, and `places` (n,) their new
-    coordinates from 0 to 1.
+    Each is a copy of the point `shares` with one variable moved. `numbers` (n,) are the indices of the variables, and
+    `places` (n,) their new coordinates from 0 to 1.
     """
     if not len(places):
         return np.ones(0, bool)

@@ -20,7 +20,7 @@ Files = Mapping[str, Content]
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
     """Return the files of figures in several formats ("png", "svg", "pdf"), by name.
 
-    Each is drawn when it is written, or when a page shows it.
+    `forms` are the formats, by default all. An image is drawn when its file is written, or when a page shows it.
     """
     forms = FORMATS if forms is None else (*forms,)
     several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]

@@ -53,8 +53,8 @@ class Report:
     """The page of a `command`: name, figures, stage file, and contents by name.
 
     `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
-    is one, extends `page.html` and changes its blocks: answer, table, figures, footer. It stands in the folder
-    templates of the package `templates`. Pages that are `scripted` load plotly even without figures.
+    is one, stands in the folder templates of the package `templates`. It extends `page.html` and changes its blocks:
+    answer, table, figures, footer. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str
@@ -106,8 +106,8 @@ def script(name: str) -> Markup:
 def environment(package: str = OWN_TEMPLATES) -> Environment:
     """Return the templates of a package and of friso/shown/templates, for one page.
 
-    Texts are escaped, and a name without a value is an error. Words of `explained` texts are linked to the
-    `glossary`.
+    Texts are escaped, and a name without a value is an error. The filter `explained` links words of a text to the
+    `glossary` of the page.
     """
     templates = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, OWN_TEMPLATES))]),
@@ -128,9 +128,9 @@ def _escaped_text(value: Any) -> Any:
 
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
-    """Return a figure as a data address in quotation marks.
+    """Return a figure as a data address in quotation marks, in the format `form`.
 
-    The image is printed, and seen in browsers without scripts.
+    The image keeps its note if `noted`. It is printed, and seen in browsers without scripts.
     """
     content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
@@ -160,7 +160,7 @@ TENTHS = 10
 def _shortened(path: re.Match[str]) -> str:
     """Write an SVG path in less text.
 
-    Each place is relative to the one before, to a tenth of a point.
+    All places are relative to the one before, to a tenth of a point.
     """
     if not _STRAIGHT.fullmatch(path[0]):
         return _SPACED.sub(r"\1", path[0])

@@ -96,8 +96,9 @@ def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool
 class _Reader:
     """Reader of the numbers of an axis, of any sign.
 
-    `field` is the key's number or quantity. A free variable has none (None): it takes the SI unit of its first value's
-    kind of quantity. Signs are free because a value that no stage may have makes only its cells invalid.
+    `field` is the key's number or quantity. It is None for a free variable, which only links use: its first value's
+    kind of quantity decides the SI unit. Any sign is allowed, because a value that no stage may have makes only its
+    cells invalid.
     """
 
     def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:
@@ -233,7 +234,7 @@ def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
 def read_axes(
     stage: Stage, axes: Mapping[str, AxisValues], free: frozenset[str], log: bool = False
 ) -> tuple[SweptAxis | SweptRange, ...]:
-    """Return all axes of a study from texts, lists or arrays with a unit, by name.
+    """Return all axes of a study; `axes` are texts, lists or arrays with a unit, by name.
 
     Ranges without a number of points stay a `SweptRange`. Names in `free` are used by links only. With `log`, ranges
     are logarithmic unless they state their spacing. Raises InputError for a name or values that the stage cannot have.

@@ -31,9 +31,10 @@ def boundary(
     `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``. A range is logarithmic with ":log" behind
     it, or with `log`. `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is
     a `Diagram`: all branches of cycles over the range, with their flips, folds and tori. With two it is a `Plane`: the
-    curves of these points. The motion of the stage file plays no part. `begins` is called once the input has been
-    checked, and `progress` while cycles are followed. Raises InputError for a wrong range, link, tolerance or stage
-    (one that cannot hunt).
+    curves on which flips, folds and tori lie. The motion of the stage file plays no part.
+
+    `begins` is called once the input has been checked, and `progress` while cycles are followed. Raises InputError for
+    a wrong range, link, tolerance or stage (one that cannot hunt).
     """
     settings = StudySettings.current()
     checked_rtol(rtol)

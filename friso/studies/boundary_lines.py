@@ -28,9 +28,10 @@ UNKNOWN marks stages whose simulations failed or did not settle; INVALID marks s
 class Line:
     """A branch of cycles over one key, or a curve in two keys: its n points in order.
 
-    `at` [SI], shape (n, keys), has the values of the keys. `error` is their error, NaN except at special points (flips,
-    folds and tori). `kinds` has the kind of each special point, "" for an ordinary one. `amplitude` [m], `period` [s]
-    and `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line ends on either side.
+    `at` [SI], shape (n, keys), has the values of the keys. `error`, of this shape, is their error [SI], NaN except at
+    special points (flips, folds and tori). `kinds` has the kind of each special point, "" for an ordinary one.
+    `amplitude` [m], `period` [s] and `multiplier` of the cycles have the shape (n,). `ends` are texts on how the line
+    ends on either side.
     """
 
     shape: CycleShape
@@ -59,7 +60,7 @@ class Line:
 
 
 class _Row(NamedTuple):
-    """Point of a line: keys and their error as fractions of their ranges, cycle and kind."""
+    """Point of a line: its keys and their error as fractions of the ranges, its cycle and kind."""
 
     at: np.ndarray
     error: np.ndarray
@@ -136,7 +137,7 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
 def place_verdicts(result: Diagram) -> list[str]:
     """Return the verdicts at stages spaced evenly over the range of a diagram.
 
-    They come from simulations, and from all branches of cycles that reach these stages.
+    Verdicts come from simulations, and from all branches of cycles that reach these stages.
     """
     verdicts = _verdicts(result)
     return [
@@ -169,8 +170,9 @@ class StabilityChange(NamedTuple):
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Return the changes at which hunting begins and ends over the range, in order.
 
-    Verdicts within the error of a special point (flip, fold or torus) do not locate a change. Unstable cycles are so
-    weak there that runs may stay on them. But such verdicts do show hunting between stages that do not hunt.
+    Verdicts within the error of a special point (flip, fold or torus) do not locate a change: cycles are so weakly
+    unstable there that runs may stay on them. Between stages that do not hunt, however, even such a verdict shows that
+    hunting begins and ends.
     """
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
     doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
@@ -195,7 +197,7 @@ def stability_changes(result: Diagram) -> list[StabilityChange]:
 def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
     """Return the values [SI] at which a followed cycle changes its stability.
 
-    Each comes with True if the cycle gains stability as the key rises, False if it loses stability.
+    With each value comes True if the cycle gains stability as the key rises, or False if it loses stability.
     """
     return sorted(
         (float(line.at[k, 0]), begins)
@@ -218,9 +220,10 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Tell whether a branch has a stable cycle on both sides of a stage in the range.
+    """Tell whether a branch of stable cycles passes a stage in the range of a diagram.
 
-    `place` is the stage's fraction of the range. False if the stability of a branch is unknown there.
+    `place` is the stage's fraction of the range. The cycles at the neighbouring points on both sides must be stable.
+    False if the stability of a branch is unknown there.
     """
     if result.in_doubt(np.array([place]))[0]:
         return False

@@ -117,9 +117,9 @@ def cell_attractors(
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, StageAttractors]]:
     """Yield the attractors of the chosen cells, grouped by equations.
 
-    `chosen` has the shape (cells,). Yields keys with SI values, indices of cells, and their attractors, which the
-    function `find` seeks, by default `find_attractors`. The motion does not matter: of cells that differ only in the
-    motion, one is surveyed.
+    `chosen`, shape (cells,), is true for these cells. For each group, keys with SI values, indices of cells, and the
+    attractors are yielded, as `find` returns them. Of cells that differ only in their motion, one is searched. The work
+    takes `threads` threads, and ends early once `cancel` is set.
     """
     for flat, cells, _ in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), find, threads, cancel)
@@ -132,9 +132,9 @@ def _once(
     threads: int | None,
     cancel: np.ndarray | None,
 ) -> StageAttractors:
-    """Find the attractors of `count` stages of one structure with `find`.
+    """Find the attractors of `count` stages of one structure with the function `find`.
 
-    Stages that differ only in their motion are searched once.
+    Stages that differ only in their motion are searched once. `threads` and `cancel` are passed on to `find`.
     """
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
@@ -170,7 +170,7 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
 def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
     """Yield the chosen cells, shape (cells,), grouped by equations.
 
-    Each group has keys with SI values, indices of cells, and the structure (what decides the equations).
+    For each group, keys with SI values, indices of cells, and the structure (what decides the equations) are yielded.
     """
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):

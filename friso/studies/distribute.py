@@ -53,7 +53,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
 async def _answers(scheduler: str) -> None:
     """Raise OSError or ValueError if nothing answers at the scheduler's address.
 
-    It is tried first because Dask's client, if it fails, lingers for long.
+    The address is tried first because Dask's client, if it fails, lingers for long.
     """
     settings = StudySettings.current()
     from distributed.comm.core import connect
@@ -73,7 +73,8 @@ def run_checked(
 ) -> Columns:
     """Run cells on a worker, after checking that its friso has the `expected` equations.
 
-    Raises InputError otherwise. Workers that joined after the study began were not checked before.
+    This is checked again for each block, because workers may join after the study began. Raises InputError for another
+    version.
     """
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())

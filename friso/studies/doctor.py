@@ -107,7 +107,10 @@ def _processor() -> str:
 
 
 def _kept_code(full_paths: bool) -> str:
-    """Check the folder of compiled code: its size, whether it is permanent, and who can read it."""
+    """Check the folder of compiled code: its size, whether it is permanent, and who can read it.
+
+    Without `full_paths`, the user's name is left out.
+    """
     from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()
@@ -164,7 +167,10 @@ def _stage() -> Stage:
 
 
 def _without_names(text: str, full_paths: bool) -> str:
-    """Return the text with home folders as ~, and the user's name elsewhere in paths as USER."""
+    """Return a text with home folders as ~, and the user's name elsewhere in paths as USER.
+
+    With `full_paths`, the text is returned unchanged.
+    """
     if full_paths:
         return text
     home = user = ""

@@ -97,8 +97,8 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
 class DrawnEdges:
     """Edges of hunting of drawn stages: the bandwidths [Hz] below which they hunt, (count,).
 
-    Each edge lies between `low` and `high`. Both are NaN for a stage that hunts at none of the tried bandwidths, or up
-    to the last. They are NaN as well if one of the answers is not certain.
+    An edge lies between `low` and `high`. Both are NaN for a stage that hunts at none of the tried bandwidths, or up to
+    the last. They are also NaN if it is not certain at one of these whether the stage hunts.
     """
 
     low: np.ndarray

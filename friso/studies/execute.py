@@ -109,8 +109,8 @@ class _Threads(ThreadPoolExecutor):
 def local_crew(threads: int | None = None) -> Crew:
     """Return a crew of this process' threads, which compute one block at a time.
 
-    `threads` is their number, by default one per processor. Meanwhile a second block is prepared, or its results
-    written.
+    `threads` is their number, by default one per processor. While they compute a block, another one is prepared, or the
+    results of one are written.
     """
     stop = np.zeros(1, np.int64)
     arguments = {"threads": threads, "cancel": stop}

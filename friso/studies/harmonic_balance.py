@@ -113,7 +113,8 @@ def _errors(
 ) -> list[tuple[float, float, str]]:
     """Return errors of period and amplitude of harmonic balance, for stage `number`.
 
-    Errors are relative to the simulated cycle. There is one (period, amplitude, status) for every highest harmonic.
+    Errors are relative to the simulated cycle. `harmonics` are the highest harmonics to try; for each, the result has
+    the error of the period, that of the amplitude, and a status.
     """
     single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES

@@ -1,7 +1,7 @@
 """Record the digests of the chunks of each block of a store, in a file per block.
 
-The digests include the study, the block and the variable. So exchanged chunks are detected, unlike with checksums
-inside the chunks. The file is written last: a block with a file is complete.
+The digests include the study, the block and the variable. So they detect exchanged chunks, unlike checksums inside the
+chunks. The file of a block is written last: a block with a file is complete.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from friso.studies.store_files import BLOCKS, digest_of, put, stored
 class Ledger:
     """The records of the blocks of a store at `path`: digests of their chunks.
 
-    They are for a `study`, by its digest, and its metrics.
+    The records are for a `study`, by its digest, and its metrics.
     """
 
     path: Path
@@ -58,7 +58,7 @@ class Ledger:
     def digest(self, number: str, name: str) -> str | None:
         """Return the recorded digest of a metric's chunk in a block.
 
-        It is None if the block was not recorded, and "" if the record is damaged or of another study. Raises
+        The result is None if the block was not recorded, and "" if the record is damaged or of another study. Raises
         PermissionError if the record cannot be read.
         """
         try:

@@ -1,8 +1,8 @@
 """Store and check a store's metadata: one file (.zmetadata) with its digest, and a copy.
 
 Zarr's readers take everything but the numbers from this file. Files beside the arrays repeat it for other programs, and
-are rewritten if they differ. The file also has friso's own notes: the digests of the axes, and colours of the figures
-beside the store.
+are rewritten if they differ. The file also has the digests of the axes, and friso's own notes, such as the metric that
+colours the map.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Define metrics of a map: how a cell's value is computed, coloured and named.
 
-Each metric is a module of `metrics`. Such a module has `METRIC` and the name of the metric; installed packages name
-theirs in the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all
-follow from it.
+Each metric is a module of `metrics`, named after the metric, which defines `METRIC`. Installed packages name theirs in
+the entry points `friso.metrics`. Stores, columns of files, axis labels, legends, sentences and `--metric` all follow
+from `METRIC`.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ class StageEvidence:
 class Word:
     """A word that a cell of a map can have.
 
-    It has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is longer.
-    `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand in the
-    third person ("swings"), for sentences that count cells. With `is_open`, the word says that a cell's result is not
-    certain: findings are stated of the other cells.
+    The word has a colour (a name of the palette of maps, or "#rrggbb"), a meaning, and a label for legends if that is
+    longer. `inferred` is a paler colour for cells whose word was inferred from neighbours. Words that are verbs stand
+    in the third person ("swings"), for sentences that count cells. With `is_open`, the word says that a cell's result
+    is not certain: findings are stated of the other cells.
     """
 
     text: str
@@ -69,7 +69,7 @@ class Word:
 class MapFinding:
     """A statement on a map: which fraction of its cells has one of the `words`, and where.
 
-    For counts, it is the fraction of cells above 0. With `if_any` the statement is left out if no cell has the word.
+    For counts, the fraction is that of cells above 0. With `if_any` the statement is left out if no cell has the word.
     """
 
     clause: str

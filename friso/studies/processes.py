@@ -33,7 +33,7 @@ _cancel = np.zeros(1, np.int64)
 def processes(workers: int) -> Iterator[Crew]:
     """Yield a crew of `workers`: separate processes on this machine.
 
-    Each computes one block at a time, in one thread. The workers end with this process, however it ends.
+    A worker computes one block at a time, in one thread. The workers end with this process, however it ends.
     """
     context = get_context("spawn")
     with interrupts_held(), _modules_of_this_folder_ignored():
@@ -73,8 +73,8 @@ def run_block(*arguments: Any) -> Columns:
 def _prepare(shared: Any, cache: Path) -> None:
     """Make this process a worker of its parent.
 
-    Ctrl-C is left to the parent process, and the worker ends with its parent. It uses the parent's cache of kernels,
-    even a temporary one.
+    Ctrl-C is left to the parent process, and the worker ends with its parent. The worker uses the parent's cache of
+    kernels, even a temporary one.
     """
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)

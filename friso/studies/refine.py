@@ -41,7 +41,10 @@ def finer(study: Study) -> Study:
 
 
 def _finer(axis: SweptAxis) -> SweptAxis:
-    """Return the axis with values in between, as if the user had asked for that many."""
+    """Return the axis with more values between its own, finer by the setting `finer_factor`.
+
+    An evenly divided range is divided anew, as if the user had asked for that many points.
+    """
     settings = StudySettings.current()
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
@@ -163,7 +166,7 @@ class _Grid:
     def filled(self) -> Columns:
         """Return the metrics of all cells; a cell not computed has the words of the nearest one.
 
-        Its status says so.
+        The status of such a cell says so.
         """
         _, nearest = self._nearest()
         guessed = ~self.computed.ravel()

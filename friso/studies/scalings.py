@@ -19,8 +19,8 @@ from friso.studies.links import names
 class Scaling:
     """Axis of factors on several keys, such as the speed of the controller.
 
-    It has `words` for figures and the function that multiplies the keys. `needs` is a key that a stage must have for
-    it.
+    Fields are `words` for figures and the function that multiplies the keys. `needs` is a key that a stage must have
+    for this axis.
     """
 
     words: str

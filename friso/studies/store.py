@@ -76,8 +76,8 @@ class Store:
     def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
         """Open the store of a study, created if it is not there.
 
-        With `overwrite` it replaces the store of another study, or a damaged one. Raises StoreError if the folder holds
-        anything else or another study, or is in use by another process.
+        With `overwrite`, the store of another study, or a damaged one, is replaced. Raises StoreError if the folder
+        holds anything else or another study, or is in use by another process.
         """
         remove_leftovers(path)
         path = where_links_lead(path)
@@ -167,7 +167,7 @@ class Store:
     def done(self) -> list[str]:
         """Return the names of the completed blocks, as in Zarr.
 
-        They are read from existing files, because a store may claim any size.
+        The names are read from existing files, because a store may claim any size.
         """
         return [number for number in self.ledger.entered() if self._is_of_block(number)]
 
@@ -238,7 +238,7 @@ class Store:
 
     @property
     def notes(self) -> Mapping[str, Any]:
-        """Return friso's own notes on the store, such as colours of figures."""
+        """Return friso's own notes on the store, such as the metric that colours its map."""
         return checked_metadata(self.path).notes
 
     def note(self, **notes: Any) -> None:
@@ -291,8 +291,8 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 class StoreState:
     """State of a study's store.
 
-    It has the number of blocks, how many are done, and the names of damaged blocks. It also lists damaged files of
-    metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
+    Fields are the number of blocks, how many are done, and the names of damaged blocks. Further fields list damaged
+    files of metadata, which the next run writes anew, and chunks that cannot be read for lack of permission.
     """
 
     blocks: int

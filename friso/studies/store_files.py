@@ -45,7 +45,7 @@ def stored(file: Path) -> bytes:
 def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
     """Return the SHA-256 of a file, of a store or beside it, or None.
 
-    It is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
+    The result is None if there is no such file, for anything but a regular file, and for more than `most` bytes. Raises
     PermissionError if the file cannot be read, which does not mean that it is damaged.
     """
     try:
@@ -59,8 +59,8 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
 def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
     """Return the arrays that `keep_arrays` wrote into a file, or None.
 
-    The result is None if they are missing, damaged, or have another text `about`. It is also None if they take more
-    than `most` bytes; no array is expanded then.
+    The result is None if the arrays are missing, damaged, or have another text `about`. It is also None if they take
+    more than `most` bytes; no array is expanded then.
     """
     try:
         content = stored(file)

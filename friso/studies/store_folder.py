@@ -48,8 +48,8 @@ def where_links_lead(path: Path) -> Path:
 def make(path: Path, fill: Callable[[Path], object]) -> None:
     """Create the folder `path`, complete or not at all.
 
-    `fill` writes the content into a temporary folder beside it, which is then renamed to `path`, unless another process
-    has created that meanwhile. Raises OSError, and then leaves nothing behind.
+    `fill` writes the content into a temporary folder beside it, which is then renamed to `path`. If another process has
+    created `path` meanwhile, that folder stays. Raises OSError, and then leaves nothing behind.
     """
     remove_leftovers(path)
     with _made_aside(path, fill) as new:
@@ -164,5 +164,5 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:
-    """Return an unused, hidden path beside a store's `path`."""
+    """Return an unused, hidden path beside a store's `path`, which ends in `suffix`."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

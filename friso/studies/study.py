@@ -106,7 +106,8 @@ class Study:
     def block_shape(self, target: int) -> tuple[int, ...]:
         """Return the shape of blocks of about `target` cells.
 
-        Blocks span the last dimensions whole, and an equal part of the one before.
+        Blocks span the last dimensions whole. The dimension before these is divided into nearly equal parts, and along
+        all earlier ones a block has one value.
         """
         shape = [1] * len(self.shape)
         for i in reversed(range(len(shape))):
@@ -139,7 +140,7 @@ class Study:
         return stage.with_numbers({key: float(np.ravel(flat[key])[0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
-        """Return a study of only some cells, side by side, by their indices in C order."""
+        """Return a study of only some cells, as samples; `cells` are their indices in C order."""
         columns = self.columns(cells)
         axes = tuple(
             SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes

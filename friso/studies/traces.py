@@ -25,10 +25,10 @@ DRAWING = "drawing runs"
 class Traces:
     """Deviations of positions from their references [m], reduced for drawing.
 
-    `deviations`, shape (cells, 2 pieces), has two extremes in order of time for each of the equal pieces of `duration`
-    [s]. It is NaN after the end of a run. `late`, shape (cells,), is the time [s] after which a run shows its final
-    behaviour. It lies half-way from the last corner to the end of the run, or from the start if that corner is very
-    late.
+    A run is cut into equal pieces over `duration` [s]. `deviations`, shape (cells, 2 pieces), has the least and the
+    largest value in each piece, in order of time; NaN after the end of a run. `late`, shape (cells,), is the time [s]
+    after which a run shows its final behaviour. It lies half-way between the last corner, or the start if that corner
+    is very late, and the end of the run.
     """
 
     deviations: np.ndarray
@@ -67,7 +67,7 @@ def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress =
 def _references(flat: Mapping[str, Any], time: np.ndarray) -> Callable[[int], np.ndarray]:
     """Return a function from the index of a run to its reference [m] at `time` [s].
 
-    Usually all runs have the same.
+    If all runs have the same motion, the reference is computed once.
     """
     moved = {key: value for key, value in flat.items() if key.startswith("motion.")}
     if not any(np.ndim(value) for value in moved.values()):
@@ -87,7 +87,8 @@ def _deviation(position: np.ndarray, reference: np.ndarray) -> np.ndarray:
 def _extremes(values: np.ndarray) -> np.ndarray:
     """Return the least and the largest value of each piece of a run, in order of time.
 
-    They are NaN if a piece is not complete.
+    `values` is cut into the pieces of the settings; the result has the shape (2 pieces,). Both values are NaN if a
+    piece is not complete.
     """
     settings = StudySettings.current()
     pieces = values.reshape(settings.trace_bins, settings.samples_per_bin)

@@ -37,7 +37,7 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 
     The counts are returned as attributes for the study. A study always verifies the same cells. In a refined map,
     inferred cells are run too, and counted apart (inferred_checked, inferred_confirmed). Invalid and failed cells have
-    no outcome that could survive. Nothing is returned if there are no others, if `share` is 0, or if the tolerance
+    no outcome that could survive. The result is empty if there are no others, if `share` is 0, or if the tolerance
     cannot be tightened. It is also empty if the attributes of the runs state the counts already.
     """
     settings = StudySettings.current()
@@ -82,8 +82,8 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     """Return the loosest tolerance at which enough outcomes survive a tighter one.
 
     How many are enough is the setting `wanted_survival`. Also returns the surviving fraction at each tolerance tried,
-    and the number of cells used. If no cell has a valid stage, there are no fractions, and the tightest tolerance is
-    returned. If no tolerance is good enough, it is the one at which most outcomes survive.
+    and the number of cells used. If no tolerance is good enough, the one at which most outcomes survive is returned. If
+    no cell has a valid stage, there are no fractions, and the tightest tolerance is returned.
     """
     settings = StudySettings.current()
     picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
@@ -124,7 +124,7 @@ def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.
 
 
 def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
-    """Return the values of single cells; a store reads only the blocks that contain them."""
+    """Return the values of single cells, (cells,); a store reads only the blocks that hold them."""
     import xarray as xr
 
     places = np.unravel_index(cells, study.shape)

@@ -64,7 +64,7 @@ def _margins(margins: Margins) -> dict[str, Any]:
 
 
 def _at(bode: Bode, member: Members, margins: Margins) -> dict[str, Any]:
-    """Return the margins of one state of friction, and which state it is."""
+    """Return the margins in one state of friction, with its bias force, speed and limiter."""
     at = {
         "bias_n": float(member.bias[0]),
         "speed_m_per_s": float(member.speed[0]),

@@ -82,7 +82,7 @@ def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
 
 @dataclass(frozen=True)
 class ResponseCurve:
-    """A complex frequency response, shape (k,), as a Bode plot draws it."""
+    """A complex frequency response, shape (k,), with the label and the look of its curve."""
 
     response: np.ndarray
     label: str
@@ -106,7 +106,7 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
 
 
 def magnitude(response: np.ndarray) -> Array:
-    """Return the absolute value of a complex response [dB]."""
+    """Return the magnitude of a complex response in dB, at each frequency."""
     return 20 * np.log10(np.abs(response))
 
 
@@ -224,9 +224,10 @@ def _nyquist(bode: Bode) -> Figure:
 
 
 def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
-    """Return Nyquist curves of some stable or unstable states of friction, evenly picked.
+    """Return Nyquist curves of some states of friction: of stable ones, or of unstable ones.
 
-    Only the parts near -1 are kept. The first curve is called `name` in the legend; all have the colour `shade`.
+    `stable` decides which; a few states are picked evenly. Only the parts near -1 are kept. The first curve is called
+    `name` in the legend; all have the colour `shade`.
     """
     numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
@@ -323,5 +324,5 @@ def _masses(bode: Bode) -> list[float]:
 
 
 def _hertz(bode: Bode) -> Array:
-    """Return the frequencies of the analysis [Hz]."""
+    """Return the frequencies of the analysis [Hz], shape (k,)."""
     return bode.omega / (2 * np.pi)

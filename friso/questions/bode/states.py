@@ -39,8 +39,8 @@ class ShownState:
 def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     """Return the limit cases, the worst settled state, and the worst state of all.
 
-    Settled states are the limit cases, and all states stuck under a bias force. The worst of all is left out if it is
-    settled. Without friction, there are only limit cases.
+    Settled states are the limit cases, and all states stuck under a bias force. If the worst state of all is settled,
+    it comes once. Without friction, there are only limit cases.
     """
     cases = [
         ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
@@ -118,7 +118,7 @@ def has_limiter(bode: Bode) -> bool:
 
 
 def has_family(bode: Bode) -> bool:
-    """Tell whether there are states beside the limit cases, which only friction creates."""
+    """Tell whether there are more states than the limit cases; only friction creates some."""
     return len(bode.scan.members) > len(bode.cases)
 
 

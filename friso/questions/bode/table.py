@@ -60,7 +60,7 @@ def growth(margins: Margins) -> str:
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
     """Write a margin by `text`; a dash if it is NaN.
 
-    If the margin equals `none`, the text says that any change is allowed.
+    `none` is the value of a margin that allows any change; the text then says so.
     """
     if math.isnan(value):
         return NOTHING
@@ -68,7 +68,7 @@ def _number(value: float, none: float, text: Callable[[float], str]) -> str:
 
 
 def _factor(value: float) -> str:
-    """Write a gain margin [dB] with its sign."""
+    """Write a gain margin, given as a factor, in dB with its sign."""
     return _signed(decibels(value), "+")
 
 

@@ -211,8 +211,8 @@ def _limits(bode: Bode, name: str) -> str:
 def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
     """Name in brackets the state that is unstable first, or closest to -1, as bandwidth rises.
 
-    `member` is this state (None: nothing is said), and `meaning` says in words why it is named. `end` is the bandwidth
-    above which the remark holds; without one, it holds for the stage as given.
+    `member` is this state; with None the text is empty. `meaning` says in words why the state is named. The remark
+    holds above the bandwidth `end` or, with None, for the stage as in the file. `name` is the state of the joint.
     """
     if member is None or len(bode.scan.members) == 1:
         return ""

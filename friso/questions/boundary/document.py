@@ -21,7 +21,7 @@ from friso.studies.boundary_lines import (
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
-    """Return the JSON document of a boundary, with values in the units of the command line."""
+    """Return the JSON document of a boundary, in the units in which the ranges were given."""
     document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
     return plain_json({"conclusion": conclusion(traced, keys), **document})
 

@@ -19,7 +19,7 @@ from friso.studies.boundary_lines import lines
 
 
 def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], stage: Stage, stem: str) -> dict[str, Content]:
-    """Return the page, the figure in all formats, and the table of points."""
+    """Return the page, the figure in all formats, and the table of points, all named `stem`."""
     figure = boundary_figure(traced, keys, stage.name)
     if isinstance(traced, Plane):
         figure = with_places(figure, [(SHOWN, stage)], [key.key for key in keys])

@@ -52,7 +52,7 @@ class BoundaryAnswer(Answer):
         return tuple(_in_its_unit(swept, text, self.axis_kind) for swept, text in ranges)
 
     def sentences(self) -> Sequence[str]:
-        """Return where hunting ends, in one sentence."""
+        """Return where hunting is possible and where it ends, as one text."""
         from friso.questions.boundary.words import conclusion
 
         return [conclusion(self.result, self.keys)]
@@ -143,7 +143,7 @@ def boundary(
 def _in_its_unit(swept: KeyRange, text: str, axis: AxisKind) -> ShownKey:
     """Return a key with the unit in which its range was given.
 
-    The unit of the upper end counts; without one, values are in SI.
+    `text` is the range as the user wrote it. The unit of its upper end counts; without one, values are in SI.
     """
     from friso.questions.boundary.words import ShownKey
 

@@ -121,7 +121,7 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """Say at which of the values tried the loop is unstable, whatever the friction.
 
-    The list is empty if it is stable at all of them.
+    The list is empty if the loop is stable at all of them.
     """
     if not traced.unstable.any():
         return []
@@ -188,9 +188,9 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(traced: Plane, number: int, keys: tuple[ShownKey, ...], digits: int = 6) -> str:
-    """Say from where to where the curve with this index runs, and how it ends there.
+    """Say from which point to which a curve of a plane runs, and how it ends there.
 
-    Values have `digits` digits.
+    `number` is the index of the curve. Values have `digits` digits.
     """
     line, ends = lines(traced)[number], [end for end in curve_ends(traced) if end.line == number]
     name = f"A {line.kinds[0]} of {CYCLES[line.shape]} runs"
@@ -260,10 +260,10 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
 
 
 def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
-    """Say in which ranges between the values tried a cycle attracts as well.
+    """Say in which ranges, between neighbouring values tried, a cycle attracts as well.
 
-    `turns` are the values at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds their
-    errors [SI]. Values that belong to no range are listed by themselves. The list is empty without `turns`.
+    `turns` are the values [SI] at which a cycle begins (true) or ceases to attract, in ascending order. `errors` holds
+    their errors [SI]. Values that bound no such range are listed by themselves. The list is empty without `turns`.
     """
     text = {value: key.as_known(value, errors[value]) for value, _ in turns}
     ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
@@ -277,7 +277,7 @@ def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors:
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
-    """Return a remark if a change lies where the loop is unstable anyway; empty otherwise."""
+    """Return a remark if hunting begins or ends where the loop is unstable anyway; else empty."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
@@ -346,7 +346,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """Say how many points a curve has, and how large their errors are."""
+    """Say how many points a curve has, and how large their errors are at most."""
     finite = line.error[np.isfinite(line.error).all(axis=1)]
     errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
     unknown = len(line.error) - len(finite)
@@ -356,7 +356,7 @@ def _accuracy(line: Line, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """Give the verdicts at the corners, in one sentence if they agree."""
+    """Give the verdicts at the corners of the plane, in one sentence if they agree."""
     corners = corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]

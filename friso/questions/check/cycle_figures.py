@@ -76,15 +76,16 @@ def _return_map(item: ShownCase) -> list[Panel]:
 
 
 def _mirrored(hunting: Hunting) -> bool:
-    """Tell whether both sides swing alike, so that one curve describes both."""
+    """Tell whether swings to both sides are alike (all cycles symmetric): one curve shows both."""
     return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
     """Return strips of distances, up to `reach` [m], from which a stage ends in hunting.
 
-    A stage that sticks at one of the `distances` sticks next at one of the `returns` [m] on the other side. Both sides
-    must behave alike. Many swings are followed by these pairs.
+    A stage that sticks at one of the `distances` [m] from its reference sticks next at one of the `returns` [m] on the
+    other side. Both sides must behave alike. Many swings are followed in this way; a stage that still swings then is
+    hunting.
     """
     starts = np.linspace(0.0, reach, _STARTS)
     at = starts
@@ -98,7 +99,10 @@ def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
 
 
 def _swings(item: ShownCase) -> Array:
-    """Return the sizes of swings [m] to alternate sides, after the reference's last corner."""
+    """Return the sizes of successive swings [m], each to the other side, shape (swings,).
+
+    Only swings after the last corner of the reference count.
+    """
     trace = trace_of(item)
     late = samples(trace, "turning_time") > last_corner(item.case.stage.flat())
     turns = samples(trace, "turning_deviation")[late]

@@ -221,7 +221,7 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
 
 
 def _ends(values: np.ndarray) -> list[float] | None:
-    """Return the least and the largest of some values; None where none is known."""
+    """Return the least and the largest finite value; None if no value is finite."""
     finite = values[np.isfinite(values)]
     return [float(finite.min()), float(finite.max())] if finite.size else None
 

@@ -37,7 +37,7 @@ MOST_LISTED = 4
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
     """Return the table's rows on machines drawn from uncertain keys.
 
-    Each has a text for the joint as given, locked and free.
+    A row has its name, and a text for the joint as given, locked and free.
     """
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
@@ -118,9 +118,9 @@ def _narrowed(draws: Draws) -> str:
 
 
 def _sentence(name: str, draws: Draws) -> str:
-    """Say with which probability the stage hunts, how far, and which key matters most.
+    """Say how probable hunting is, with its amplitude and period, and which key matters most.
 
-    `name` is the case: "given", "locked" or "free".
+    `name` is the case: "given", "locked" or "free". For "given", the edge of hunting is added.
     """
     fates = draws.fates[name]
     open_ones = {word: fates.counts[word] for word in UNDECIDED if fates.counts[word]}

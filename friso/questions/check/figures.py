@@ -98,9 +98,9 @@ _TIME = Axis("Time", "s")
 
 
 def _settling_figure(cases: list[ShownCase]) -> Figure:
-    """Draw the deviation after the move with its counted peaks, and the settling.
+    """Draw the deviation after the move with its counted peaks, and how it settles.
 
-    It is Fig. 5 of the thesis.
+    The figure is like Fig. 5 of the thesis.
     """
     start, end = _window(cases)
     lines, peaks = [], []
@@ -264,7 +264,7 @@ def _friction(with_trace: list[ShownCase]) -> Figure:
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
-    """Return a panel of lines; a line much shorter than the others becomes a point."""
+    """Return a panel of lines; a line far narrower in x than the widest becomes a point."""
     spans = [_span(line.x) for line in lines]
     rest = [span <= 0.01 * max(spans) for span in spans]
     points = [
@@ -286,12 +286,12 @@ def _window(cases: list[ShownCase]) -> tuple[float, float]:
 
 
 def _deviation(item: ShownCase) -> Array:
-    """Return position minus reference [m] of a run."""
+    """Return position minus reference [m] over the run of a case, shape (n,)."""
     return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
 
 
 def _cut(item: ShownCase, values: Array, start: float, end: float) -> tuple[Array, Array]:
-    """Return times [s] and values between start and end [s]."""
+    """Return the times [s] between start and end [s] of a case's run, and the `values` at them."""
     time = samples(trace_of(item), "time")
     inside = (time >= start) & (time <= end)
     return time[inside], values[inside]

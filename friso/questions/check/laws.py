@@ -41,7 +41,10 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
 
 
 def _misses(verdict: LawVerdict) -> str:
-    """Say by how much a law misses the virgin curve; empty if the law reproduces it."""
+    """Say by how much a law misses the virgin curve; empty if the law reproduces it.
+
+    The virgin curve is the friction force over the displacement from rest.
+    """
     off = next((item.off for item in verdict.conversion.lost if item.kind == "virgin"), 0.0)
     advice = "leave it out if the virgin curve of this machine was measured"
     return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {advice}." if off else ""
@@ -145,7 +148,7 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
 def _beyond(laws: VerdictsByLaw, case: str) -> str:
     """Warn that advice keeps clear of the edge under the stage's own law alone.
 
-    The warning is empty if that edge is the highest.
+    The warning is empty unless another law has a higher edge, and the stage surely hunts under its own.
     """
     own, *others = laws.verdicts
     edges = own.edges(case)
@@ -170,10 +173,10 @@ def laws_columns(laws: VerdictsByLaw) -> list[str]:
 
 
 def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
-    """Return the rows of the table with one column per law.
+    """Return the rows of the table with one column per friction law.
 
-    Verdict, amplitude and edge come first, with the joint as given, locked and free. Then follow what was varied, what
-    is not reproduced, and where the law is passive.
+    Verdict, amplitude and edge come first, with the joint as given, locked and free. Then follow the law's parameters
+    that were varied, measured effects that it does not reproduce, and its condition of passivity.
     """
     rows = []
     for case, label in case_labels(laws.stage).items():

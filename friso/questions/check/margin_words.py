@@ -76,7 +76,7 @@ def thin_margins(case: Case) -> list[str]:
 
 
 def _side(side: int) -> str:
-    """Return "below" or "above"."""
+    """Return "above" for the side 1 of a parameter's own value, "below" for the side -1."""
     return "below" if side < 0 else "above"
 
 

@@ -41,7 +41,7 @@ def check_files(
     isolator: Suggestion | None = None,
     laws: VerdictsByLaw | None = None,
 ) -> dict[str, Content]:
-    """Return the report as the only file."""
+    """Return the report of a check by its file name; it is the only file."""
     return {"report.html": check_html(cases, draws, isolator, laws)}
 
 
@@ -53,8 +53,8 @@ def check_html(
 ) -> str:
     """Return the report for the cases "given" and, with a joint, "locked" and "free".
 
-    Traces may be missing. `draws`, `isolator` and `laws` add what drawn stages do, what an isolator would do, and the
-    verdict across friction laws.
+    Cases without time responses have no figures. `draws`, `isolator` and `laws` add what drawn stages do, what an
+    isolator would do, and the verdict across friction laws.
     """
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage

@@ -48,9 +48,9 @@ UNSTABLE_AS_BUILT = "it leaves out the samples and delays of the drive, with whi
 class CheckAnswer(Answer):
     """The verdict on a stage.
 
-    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` holds what machines do that
-    were drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some of them undrawn. `laws` holds the
-    verdicts under all friction laws, or None.
+    `result` holds a `Case` for "given" and, with a joint, for "locked" and "free". `draws` are the results on machines
+    drawn from uncertain keys, or None. `cut` is true if Ctrl-C left some machines undrawn. `laws` holds the verdicts
+    under all friction laws, or None.
     """
 
     stage: Stage
@@ -278,7 +278,10 @@ def checked_stage(
 
 
 def _as_built(case: Case) -> Case:
-    """Return a case of the check, not certain if the drive's sampling makes the loop unstable."""
+    """Return a case of the check, with its loop judged also as the sampled drive runs it.
+
+    If samples and delays of the drive make this loop unstable, the verdict becomes uncertain.
+    """
     from friso.frequency.crossover import unstable_as_built
 
     states: tuple[LoopState, LoopState] = ("sticks", "slides")
@@ -293,7 +296,7 @@ def _as_built(case: Case) -> Case:
 def mention_verdict(stage: Stage, name: str, verdict: Verdict) -> None:
     """Log the verdict on a stage as soon as it is certain, while other parts are still computed.
 
-    `name` is the case: "given", "locked" or "free". The message is information of the logger "friso".
+    `name` is the case: "given", "locked" or "free". The message goes to the logger "friso", at the level INFO.
     """
     from friso.questions.check.words import IN_SHORT
     from friso.shown.cases import case_labels

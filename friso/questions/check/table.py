@@ -38,14 +38,18 @@ def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
 
 
 def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """Return the rows on what the verdict rests on, in terms of the method."""
+    """Return further rows, for readers who know the method: on what the verdict rests.
+
+    A row has its name and one text for each case; rows without any entry are left out.
+    """
     return _rows(_BEHIND, cases)
 
 
 def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
-    """Return rows with one text for each case, computed by `columns`.
+    """Return rows with one text for each case.
 
-    Rows in which no case has an entry are left out.
+    `columns` has, by the name of a row, the function that writes a text about a case. Rows in which no case has an
+    entry are left out.
     """
     texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]

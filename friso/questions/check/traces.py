@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def trace_of(item: ShownCase) -> xr.Dataset:
-    """Return the time response of a stage that has one."""
+    """Return the time response of a case that was run."""
     assert item.case.trace is not None  # check_figures let no other through
     return item.case.trace
 
 
 def samples(trace: xr.Dataset, name: str) -> Array:
-    """Return the numbers of a variable in its own unit."""
+    """Return a variable of a time response as an array of numbers, in its own unit."""
     return np.asarray(trace[name].values, dtype=float)
 
 

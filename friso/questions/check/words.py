@@ -88,7 +88,10 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 
 def _loop(case: Case) -> list[str]:
-    """Say where the loop is unstable, even without friction or by the drive alone; else empty."""
+    """Say in which states the loop is unstable, whatever the friction; empty if in none.
+
+    A loop that only samples and delays of the drive make unstable is described as such.
+    """
     built = case.unstable_as_built
     drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
     return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
@@ -246,7 +249,8 @@ def _settling(case: Case) -> str:
 def _later(case: Case) -> str:
     """Say that a motion which still swings at the end of its run comes to rest later.
 
-    The text is empty if its settling time is known, and unless it swings by 10 um or more about its reference.
+    The text is empty if the motion settles within its run, or swings by less than 10 um. It is also empty if the stage
+    ends more than 10 um off its reference.
     """
     if case.in_the_end.get(_TEN_MICRON) is not None or case.peak_to_peak < _TEN_MICRON or case.offset > _TEN_MICRON:
         return ""
@@ -254,7 +258,7 @@ def _later(case: Case) -> str:
 
 
 def _stuck(case: Case) -> str:
-    """Say that the motion does not break the stage away, if only its bristles yield."""
+    """Add that the motion does not break the stage away, with both forces; empty if it does."""
     if not case.unmoved:
         return ""
     force, least = _forces(case.largest_force, case.breakaway)
@@ -315,7 +319,7 @@ def _running_away(case: Case) -> list[str]:
 
 
 def _or_more(kick: Kick) -> str:
-    """Say that all larger kicks searched do the same, if they do."""
+    """Add " or more" if all larger kicks searched start hunting as well; else nothing."""
     return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
 
 
@@ -380,7 +384,10 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
 
 
 def _elsewhere(case: Case) -> str | None:
-    """Return the key that sets the bandwidth; None if it is a crossover or does not exist."""
+    """Return the key that sets the bandwidth, unless this key is a crossover.
+
+    Returns None for a crossover, and if no key sets the bandwidth.
+    """
     controller = case.stage.controller
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
@@ -445,7 +452,10 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
-    """Say to which lower bandwidth the stage settles, in place of a higher one."""
+    """Say to which bandwidth the controller has to be slowed down for the stage to settle.
+
+    `end` is the lower end of the bandwidths at which hunting attracts. The text says if it is not certain.
+    """
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
     return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
 
@@ -489,10 +499,10 @@ def _with_other_friction(case: Case) -> str:
 
 
 def _distance(case: Case, edge: Margin) -> float:
-    """Return by which factor the bandwidth advised lies above the edge of hunting.
+    """Return the factor by which the bandwidth advised lies above the edge of hunting.
 
-    The factor is 1 if hunting returns within that distance, over a range wide or close enough to matter, or beyond the
-    bandwidths searched.
+    Usually it is the distance that advice keeps. It is 1 if the stage hunts again within that distance, over a range
+    wide or close enough to matter. It is also 1 if the distance leads beyond the bandwidths searched.
     """
     distance = SEARCH_LIMITS.edge_distance
     to = edge.quiet * distance

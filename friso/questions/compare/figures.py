@@ -89,7 +89,10 @@ def _other(share: Share) -> Share:
 def _bars(
     x: np.ndarray, ends: list[tuple[float, float]], colour: str, factor: float = 1.0, width: float = 1.4
 ) -> Series:
-    """Return vertical bars at `x`, from low to high `ends` times `factor`: one line with gaps."""
+    """Return vertical bars at `x`, drawn as one line with gaps between them.
+
+    A bar runs from the low to the high value of its `ends`, both times `factor`. `width` is that of the line.
+    """
     places = np.repeat(x, 3)
     heights = np.array([value for low, high in ends for value in (factor * low, factor * high, np.nan)])
     return Series(places, heights, "", colour, width=width)
@@ -98,7 +101,7 @@ def _bars(
 def _settling(comparison: Comparison, within: str) -> Panel:
     """Return the panel of the fraction of machines in position over the time since the move.
 
-    `within` writes the length that counts as in position.
+    `within` is the tolerance that counts as in position, as text.
     """
     flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
@@ -134,7 +137,10 @@ def _standstill(comparison: Comparison) -> Panel:
 
 
 def _most(result: OptionResult) -> tuple[float, float]:
-    """Return the percentiles between which most machines' in-position RMS [m] lies."""
+    """Return the range of the in-position RMS [m] in which most machines lie.
+
+    Its ends are two percentiles of the finite values; NaN if there are none.
+    """
     finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
     if not finite.size:
         return np.nan, np.nan

@@ -12,6 +12,6 @@ if TYPE_CHECKING:
 
 
 def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:
-    """Return the stage file with the new law, and the figure."""
+    """Return the stage file with the new law, and the figure, both named `stem`."""
     (figure,) = convert_figures(conversion)
     return {f"{stem}.toml": conversion.stage.to_toml(), **image_files(figure, stem, ["png"])}

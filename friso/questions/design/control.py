@@ -53,7 +53,7 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
 
 
 def _faster(design: Design) -> str:
-    """Say how much more joint damping would allow a higher crossover."""
+    """Say how high the crossover could be with more joint damping, and with how much."""
     assert design.damped
     return (
         f"With {trimmed(design.damped.needed, 'N*s/m')} of joint damping instead of "
@@ -95,7 +95,7 @@ def _bounds(bounds: list[CrossoverBound]) -> str:
 
 
 def _margin(design: Design) -> str:
-    """Write the least modulus margin, as designed and over the corners."""
+    """Write the least modulus margin, as designed and at the extremes of friction and masses."""
     controller = design.controller
     return (
         f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
@@ -104,7 +104,7 @@ def _margin(design: Design) -> str:
 
 
 def _damping(design: Design) -> str:
-    """Say whether more damping in the joint would raise the modulus margin enough."""
+    """Say whether damping is worth adding in the joint, to raise the least modulus margin."""
     damping = design.controller.damping
     as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
     now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"

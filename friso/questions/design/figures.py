@@ -97,7 +97,10 @@ def _front(design: Design) -> Figure:
 
 
 def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
-    """Return stiffness [N/mm] and frequency [Hz] of leaf springs, by closed forms or by beams."""
+    """Return the stiffness [N/mm] and the frequency [Hz] of several leaf springs, as two arrays.
+
+    The numbers are by closed forms for a `Candidate`, and by beams for a `Confirmed` one.
+    """
     stiffness = np.array([candidate.stiffness / 1e3 for candidate in several])
     return stiffness, np.array([candidate.frequency for candidate in several])
 
@@ -183,7 +186,7 @@ def _settling(design: Design) -> Figure:
 
 
 def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
-    """Return settling times [s] and the fraction of moves [%] that have settled by then."""
+    """Return settling times [s] in ascending order, and the moves settled by each of them [%]."""
     times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:
         return np.array([1e-6]), np.array([np.nan])

@@ -74,7 +74,11 @@ def joint_step(design: Design) -> DesignStep:
 
 
 def _edge(corners: Corners, factor: float = 1.0) -> str:
-    """Write an edge of hunting, multiplied by a factor, as a frequency [Hz]."""
+    """Write the highest edge of hunting among the corners, times a factor, as a frequency [Hz].
+
+    If some corner hunts at all crossovers searched, the text gives the end of the search. If none hunts, it is "none
+    found".
+    """
     if not corners.hunts:
         return "none found"
     beyond = f"beyond {hertz(corners.searched[1])}"

@@ -28,8 +28,8 @@ def comfortable(design: Design) -> Range:
 def stiffest(design: Design) -> float:
     """Return the highest crossover [Hz] that leaf springs on the Pareto front allow.
 
-    The crossover is a fixed fraction of the highest frequency on the front of a first mode that interferes with
-    control.
+    Leaf springs allow a fixed fraction of the frequency of their first mode that interferes with control. The highest
+    such frequency on the front counts.
     """
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 

@@ -65,7 +65,7 @@ def isolator(fitted: LeavesAndCrossover, crossover: float) -> str:
 
 
 def headline(design: Design) -> list[tuple[str, str]]:
-    """Return the verdicts with their colours: isolator or not, which one, and whether it holds."""
+    """Return the verdicts with their colours: is an isolator needed, which one, do moves settle."""
     return [
         (ORANGE if design.needed else GREEN, need_words(design.need)),
         (
@@ -199,7 +199,10 @@ def edge(corners: Corners) -> str:
 
 
 def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
-    """Describe a corner, one extreme of all uncertain keys, by its friction and masses."""
+    """Describe a corner, an extreme of all uncertain keys, by its friction and masses.
+
+    `number` is the index of the corner, and `flat` has the keys of the stage.
+    """
     keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))

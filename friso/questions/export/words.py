@@ -23,7 +23,7 @@ def sentences(gains: Gains) -> list[str]:
 
 
 def rows(gains: Gains) -> list[tuple[str, list[str]]]:
-    """Return each gain with its symbol and its values."""
+    """Return a row for each gain: its name, symbol, first value, and its values in other units."""
     return [
         (row.name, [row.symbol, _with_unit(row.values[0]), "; ".join(map(_with_unit, row.values[1:]))])
         for row in gains.conversions

@@ -141,7 +141,7 @@ def _stage_note(drawing: PaperDrawing) -> list[str]:
 def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
     """Return the stage as a block in the view from the side (1) or from above (2).
 
-    Parts without room on the sheet are cut off.
+    `middle` is the height on paper of the view's origin. Parts without room on the sheet are cut off.
     """
     (x1, x2), (low, high) = drawing.block[0], drawing.block[view]
     (left, right), (bottom, top) = drawing.spans[0], drawing.spans[view]
@@ -178,7 +178,7 @@ def _top_view(drawing: PaperDrawing) -> list[str]:
 
 
 def _axes(y: float, up: str) -> list[str]:
-    """Return the two axes of a view, at its lower left."""
+    """Return the two axes of a view, at its lower left: x to the right, and the one named `up`."""
     corner = (9.0, y)
     parts = [path([(9.0, y - 8), corner, (17.0, y)], "thin"), arrow((17.0, y), (1, 0)), arrow((9.0, y - 8), (0, -1))]
     return [*parts, words((18.2, y + 1), "x"), words((8.0, y - 9.2), up)]
@@ -216,7 +216,7 @@ def _centre_mark(at: SheetPoint) -> list[str]:
 
 
 def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
-    """Return the symbol of the actuator: arrows along the motion, or a tip seen end-on."""
+    """Return the symbol of the actuator: arrows if seen `sideways`, else a tip seen end-on."""
     if not sideways:
         return [circle(at, 2.2), circle(at, 0.4, "#222222")]
     x, y = at

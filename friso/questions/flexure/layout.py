@@ -79,19 +79,22 @@ class PaperDrawing:
 
     @cached_property
     def block(self) -> tuple[tuple[float, float], ...]:
-        """Return the extent of the stage's block along x, z and y from the origin [mm on paper]."""
+        """Return both ends of the stage's block along x, z and y, from the origin [mm on paper]."""
         centre, edges = self.mechanism.body.centre, block_size(self.mechanism)
         return tuple((self.size(centre[k] - edges[k] / 2), self.size(centre[k] + edges[k] / 2)) for k in (0, 2, 1))
 
     @property
     def core(self) -> tuple[float, float]:
-        """Return the extent along x of the parts that must be visible: leaves, clamps, marked points."""
+        """Return both ends, along x, of the parts that must be visible [mm on paper].
+
+        These parts are leaves, clamps and marked points.
+        """
         marked = [self.size(point[0]) for point in self.points.values()]
         return min(-CLAMP, *marked), max(self.size(self.mechanism.length) + CLAMP, *marked)
 
     @cached_property
     def spans(self) -> tuple[tuple[float, float], ...]:
-        """Return the extents of the views along x, z and y.
+        """Return both ends of the views along x, z and y, from the origin [mm on paper].
 
         The views show all parts that must be visible, and as much of the stage's block as there is room for.
         """
@@ -106,7 +109,7 @@ class PaperDrawing:
     def _upwards(self, half: float, axis: int) -> tuple[float, float]:
         """Return how far a view reaches along `axis` (1: y, 2: z), below and above its origin [mm].
 
-        It holds `half` to both sides, the marked points, and a part of the block.
+        The view holds the length `half` to both sides, the marked points, and a part of the stage's block.
         """
         marked = [self.size(point[axis]) for point in self.points.values()]
         low, high = min(-half, *marked), max(half, *marked)
@@ -119,18 +122,18 @@ class PaperDrawing:
 
     @property
     def x0(self) -> float:
-        """Return x = 0 on paper [mm]; the views stand centred between the notes."""
+        """Return where x = 0 lies on paper [mm]; the views stand centred between the notes."""
         left, right = self.spans[0]
         return LEFT + 5 - left + max(0.0, (WIDTH - 10 - LEFT - RIGHT - (right - left)) / 2)
 
     @property
     def z0(self) -> float:
-        """Return z = 0 on paper [mm], in the view from the side."""
+        """Return where z = 0 lies on paper [mm], in the view from the side."""
         return 5 + ABOVE + self.spans[1][1]
 
     @property
     def y0(self) -> float:
-        """Return y = 0 on paper [mm], in the view from above."""
+        """Return where y = 0 lies on paper [mm], in the view from above."""
         return self.z0 - self.spans[1][0] + BELOW + ABOVE + self.spans[2][1]
 
     @property

@@ -84,7 +84,10 @@ def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
 
 
 def best_view(mechanism: Mechanism, mode: Mode) -> str:
-    """Return the first view that shows nearly all of a mode's motion, or else the best view."""
+    """Return the name of the first view that shows nearly all of a mode's motion.
+
+    If there is none, the view that shows most of the motion is taken.
+    """
     everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
     shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
     spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
@@ -94,7 +97,7 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
     """Return the fraction of a mode's kinetic energy that its picture shows.
 
-    This is the energy of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
+    The picture shows the motion of the stage and of the middle lines of the leaves. The rest is torsion of the leaves.
     """
     speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
     stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
@@ -105,7 +108,7 @@ def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
 
 
 def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
-    """Return the displacements of the corners of the stage's block in a mode."""
+    """Return the displacements of the eight corners of the stage's block in a mode, (8, 3)."""
     signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
     return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
 
@@ -116,7 +119,7 @@ def _centre(mechanism: Mechanism) -> Array:
 
 
 def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
-    """Return the displacements of points of the stage, shape (n, 3), in a mode."""
+    """Return the displacements, in a mode, of points [m] of the stage; both of shape (n, 3)."""
     arm = points - np.array([float(mechanism.length), 0.0, 0.0])
     return mode.stage[:3] + np.cross(mode.stage[3:], arm)
 
@@ -155,7 +158,7 @@ def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> lis
 def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return the outline of a leaf from above: both long edges and both ends.
 
-    Cross-sections turn as the middle line does.
+    `offset` is the leaf's height z [m]. Cross-sections turn as the middle line does.
     """
     x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
@@ -180,7 +183,8 @@ def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
 def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Return a few cross-sections of a leaf between cart and stage, at rest and moved.
 
-    Their turn grows evenly up to the turn of the stage.
+    `offset` is the leaf's height z [m]. Along the leaf, sections turn by an evenly growing part of the turn of the
+    stage.
     """
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
@@ -194,7 +198,7 @@ def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> l
 
 
 def _polyline(lines: list[Array]) -> tuple[Array, Array]:
-    """Join lines into one with gaps between them, each coordinate of shape (n,)."""
+    """Join lines, each of shape (n, 2), into one with gaps between them; return its x and y."""
     gap = np.full((1, 2), np.nan)
     points = np.concatenate([part for line in lines for part in (line, gap)])
     return points[:, 0], points[:, 1]

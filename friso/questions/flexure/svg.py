@@ -47,7 +47,7 @@ HATCH = (
 
 
 def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
-    """Return the whole drawing [mm], with a title for readers that cannot see pictures."""
+    """Return the drawing as SVG, `width` by `height` [mm]; screen readers read the `label`."""
     size = f'width="{_n(width)}mm" height="{_n(height)}mm" viewBox="0 0 {_n(width)} {_n(height)}"'
     paper = f'<rect width="{_n(width)}" height="{_n(height)}" fill="#ffffff"/>'
     body = "\n".join([f"<title>{escape(label)}</title>", HATCH, paper, *parts])
@@ -85,7 +85,10 @@ def circle(centre: SheetPoint, radius: float, fill: str = "none") -> str:
 def words(
     at: SheetPoint, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
 ) -> str:
-    """Return a text on its baseline; an `upright` text is read from the right."""
+    """Return a text whose baseline goes through `at`; an `upright` text is read from the right.
+
+    `anchor` says which part of the text stands at this point: "start", "middle" or "end".
+    """
     x, y = _n(at[0]), _n(at[1])
     turn = f' transform="rotate(-90 {x} {y})"' if upright else ""
     weight = ' font-weight="bold"' if bold else ""

@@ -70,9 +70,10 @@ def assumptions(stage: Stage) -> list[str]:
 
 
 def _joint(evaluation: Evaluation) -> str:
-    """Describe the leaves, their stiffness and force, and the stage's frequency on them.
+    """Describe the leaves: their sizes, drive stiffness, and force at full stroke.
 
-    All are along the motion, with the cart held. The force is given at full stroke, with its deviation from linear.
+    The drive direction is that of the motion. Also given are the stage's frequency with the cart held, and how far the
+    force deviates from linear.
     """
     mechanism, drive = evaluation.mechanism, evaluation.modes[0]
     return (

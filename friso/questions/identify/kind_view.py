@@ -31,8 +31,8 @@ TIME = Axis("Time", "s")
 class PredictionView(Generic[Result]):
     """How to show another log that the model from a kind of experiment predicts.
 
-    Of the prediction, `worst` returns the largest relative error, and `sentence` describes the errors. `numbers` go
-    into the JSON document. `figures` take the log's number as well, for their names.
+    All fields are functions of the prediction. `worst` returns the largest relative error, and `sentence` describes the
+    errors. `numbers` go into the JSON document. `figures` also takes the log and its number, for the figures' names.
     """
 
     worst: Callable[[Result], float]
@@ -46,10 +46,12 @@ class KindView(Generic[Result]):
     """How to show the results of one kind of experiment.
 
     Terminal and page show the `title`, `facts`, `sentences` and `warnings`. `numbers` go into the JSON document, in SI
-    with the unit in the key or beside it. Names of `figures` begin with the name that is passed. `headline` is a
-    sentence at the head of the page, beside the estimates of keys; it may be empty. `longest` is true if only the
-    longest stretch of a log without gaps is analysed. `opening` is the last part of the name of the figure that opens
-    the page, or empty.
+    with the unit in the key or beside it. `figures` also takes a name, with which the names of the figures begin.
+    `headline` is a sentence at the head of the page, beside the estimates of keys; it may be empty.
+
+    `longest` is true if only the longest stretch of a log without gaps is analysed. `opening` is the last part of the
+    name of the figure that opens the page, or empty. `prediction` says how to show other logs that the model predicts,
+    if it can.
     """
 
     title: str

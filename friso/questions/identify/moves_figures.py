@@ -101,7 +101,10 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, ...]:
-    """Draw position, force and the residuals of both, of a record simulated in closed loop."""
+    """Draw position, force and the residuals of both, as measured and as simulated.
+
+    `part` selects samples of the log, and `simulated` is their simulation in closed loop.
+    """
     time, position, force = log.time[part], log["position"][part], log["force"][part]
     expected = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
     apart = Series(time, position - simulated.position, "", VERMILLION, width=1.0)
@@ -206,10 +209,10 @@ def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
-    """Draw how much worse the fit becomes as one parameter is varied, over what is accepted.
+    """Draw how much worse the fit becomes as one parameter is varied; 1 is the limit accepted.
 
-    `best` is the cost of the best fit. `fitted` is true if the fit could determine the parameter, which sets the
-    colour.
+    The interval of the parameter is shaded. `best` is the cost of the best fit. `fitted` is true if the fit could
+    determine the parameter, which sets the colour.
     """
     worse = (profile.cost - best) / (profile.limit - best)
     log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]

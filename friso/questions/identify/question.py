@@ -56,9 +56,9 @@ MappingKeeper = Callable[[dict[Path, Mapping]], object]
 class IdentifyAnswer(Answer):
     """The machine that logs show.
 
-    `result` is an `Identification` with the estimates. It holds a `stage` if the logs describe a whole machine.
-    `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of friso check
-    on the stage, where that was asked.
+    `result` is an `Identification` with the estimates, and with a `stage` if the logs describe a whole machine.
+    `inputs` are the files read, and `predictions` the predictions of other logs. `checked` is the answer of `friso
+    check` on the stage; None unless that was asked for.
     """
 
     inputs: Sequence[LogFile]
@@ -256,9 +256,9 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
-    """List the keys of tables that a stage file lacks, which a stage `made` from logs supplies.
+    """List the keys that a stage `made` from logs has in tables that a stage file lacks.
 
-    Keys that the user sets are left out.
+    `lacking` names these tables. Keys that the user sets are left out.
     """
     keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
@@ -299,7 +299,7 @@ def _settings(bandwidth: FrequencyLike | None, band: FrequencyBand | None, perio
 def mention_first_estimates(name: str, estimates: Sequence[Estimate]) -> None:
     """Log the first estimates of a log of moves, while the whole model is still fitted.
 
-    The message is information of the logger "friso".
+    The message goes to the logger "friso", at the level INFO. Nothing is logged if no estimate has a value.
     """
     from friso.questions.identify.numbers import with_interval
 

@@ -193,7 +193,7 @@ def _amplitudes(bench: Bench, name: str) -> Figure:
 
 
 def _rising(response: FrequencyResponse, high: float) -> tuple[Array, Array]:
-    """Return the frequencies [Hz] up to `high`, and the acceleration per input at each."""
+    """Return the frequencies [Hz] up to `high`, and the size of acceleration over input at each."""
     chosen = (response.frequency > 0) & (response.frequency <= high)
     hertz = response.frequency[chosen]
     return hertz, np.abs(response.response[chosen]) * (2 * np.pi * hertz) ** 2

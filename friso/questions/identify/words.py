@@ -62,7 +62,7 @@ class ExperimentSummary:
 
 @dataclass(frozen=True)
 class EstimateRow:
-    """A line of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
+    """A row of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
 
     determined: bool
     texts: tuple[str, ...]
@@ -124,14 +124,14 @@ ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 
 
 def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate may be zero, and is of a bias or of viscous asymmetry."""
+    """Tell whether an estimate is one of a bias or of viscous asymmetry, and may be zero."""
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
     """Name the experiments that would show the quantities that are not identified.
 
-    A kind in `done` is left out: why its logs were not enough is said elsewhere.
+    Kinds of experiment in `done` are left out: why their logs were not enough is said elsewhere.
     """
     names: dict[str, list[str]] = {}
     for estimate in estimates:

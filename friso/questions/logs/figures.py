@@ -44,9 +44,9 @@ def _panel(channel: ChannelContent) -> Panel:
 
 
 def _within_range(values: np.ndarray) -> np.ndarray:
-    """Return the values that a picture can show, at most `largest_value` (a setting) in size.
+    """Return values, shape (n,), of which those too large for a picture are NaN.
 
-    Larger values become NaN, and values smaller than its inverse become 0.
+    The limit is the setting `largest_value`. Values smaller than its inverse become 0.
     """
     settings = LogSettings.current()
     sizes = np.abs(values)

@@ -233,9 +233,9 @@ def coloured(runs: xr.Dataset) -> list[str]:
 def _range(name: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
     """Return the limits of a colour scale, whether it is logarithmic, and the colours of counts.
 
-    Limits that a metric defines are taken as they are. Each count gets one colour; 0 gets the colour of a stage at
-    rest. Numbers that span more than three decades get a logarithmic scale of at most six: anything smaller is solver
-    noise of a stage at rest.
+    `name` is the metric. Limits that it defines are taken as they are. If its numbers are counts, each count gets one
+    colour; 0 gets the colour of a stage at rest. Positive numbers that span more than three decades get a logarithmic
+    scale of at most six: anything smaller is solver noise of a stage at rest.
     """
     finite, metric = numbers[np.isfinite(numbers)], metrics().get(name)
     if not finite.size:
@@ -280,7 +280,10 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
 
 
 def _state(outcome: str | None, status: str | None) -> Category | None:
-    """Return why a cell has no numbers of its own; None if it was run to its end."""
+    """Return why a cell has no numbers of its own, as a category; None if it ran to its end.
+
+    `outcome` and `status` are the texts of the cell, None if the runs have no such variable.
+    """
     reason = status or ""
     if reason.startswith(INFERRED):
         return categories_of("outcome", True).get(outcome or "") or Category("inferred", "#eeeeee")
@@ -294,9 +297,9 @@ def _state(outcome: str | None, status: str | None) -> Category | None:
 
 
 def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
-    """Return evenly spread indices along dimensions, of at most `most` combinations.
+    """Return evenly spread indices along each dimension, together at most `most` combinations.
 
-    The longest dimension is thinned first.
+    `sizes` are the lengths of the dimensions. The longest one is thinned first.
     """
     counts = list(sizes)
     while math.prod(counts) > most and max(counts) > 1:

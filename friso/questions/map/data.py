@@ -69,7 +69,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = 
 def machine_of(runs: xr.Dataset) -> Stage | None:
     """Return the machine around which keys were swept.
 
-    Returns None if keys are tied to others, or if the runs are no study of friso.
+    Returns None if links tie keys to others, or if the runs are no study of friso.
     """
     if json.loads(runs.attrs.get("links", "{}")):
         return None
@@ -119,10 +119,10 @@ HIGHEST = 250
 
 
 def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
-    """Return the runs as lines, for each cell.
+    """Return the run of each cell as a line: its heights, and the range that they cover.
 
-    Each run has the range that shows its final behaviour. Heights are bytes from 0 to HIGHEST, which cover the range
-    and half a range beyond either end; lines are cut there.
+    The range shows the final behaviour of the run. Heights are bytes from 0 to HIGHEST, which cover the range and half
+    a range beyond either end; lines are cut there.
     """
     outcome = runs["outcome"]
     of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
@@ -139,8 +139,8 @@ def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
 def _axis(axis: CellAxis, positions: np.ndarray, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return an axis with its values at `positions`, the indices of the cells on the page.
 
-    The value of the machine with the keys `flat` is added. It is null for an axis of words, and beyond the ends of the
-    axis.
+    The value of the machine with the keys `flat` is added. This value is null for an axis of words, and beyond the ends
+    of the axis.
     """
     values = axis.positions[positions]
     factor, unit = choose(axis.positions, axis.unit, log=axis.log)

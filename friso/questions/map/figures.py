@@ -31,8 +31,8 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
     """Draw a variable over one axis as a line, over two as cells, over more as slices.
 
     Samples are drawn as points. `runs` is what friso.sweep returns, and `metric` a variable of it. `marker` is the
-    evaluation point: SI values or words by key. Raises ValueError for a missing metric, runs without dimensions, or a
-    marker that lacks an axis.
+    evaluation point, by key: SI values or words. It is drawn unless there is a single axis. Raises ValueError for a
+    missing metric, runs without dimensions, or a marker that lacks an axis.
     """
     axes, colouring = axes_of(runs), look(runs, metric)
     caption, columns = "", 1
@@ -117,8 +117,9 @@ def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> 
 def _edges(x: CellAxis, y: CellAxis, colouring: Look, codes: np.ndarray) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 
-    The curve runs half-way between cells of a map of verdicts, and may have several parts. The result is empty for
-    other metrics, for an axis with words or a single cell, and if all cells are on one side.
+    `codes`, shape (y, x), are the indices of the cells' categories in `colouring`. The curve runs half-way between
+    cells, and may have several parts. The result is empty for other words than verdicts, and for an axis with words or
+    a single cell. It is also empty if all cells are on one side.
     """
     attracted = [k for k, kind in enumerate(colouring.categories) if kind.label in ATTRACTED]
     if min(codes.shape) < 2 or x.words or y.words or not attracted:
@@ -158,7 +159,7 @@ def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tup
 def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
     """Draw a map of three or more axes as panels over two axes, at some values of the others.
 
-    The text says which of these values have no panel.
+    Also returns a text that says which of these values have no panel. `marker` is a point to mark, by its values.
     """
     x, y, *further = plane_first(axes)
     picked = pick([len(axis.places) for axis in further], SLICES)
@@ -192,7 +193,7 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
 def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
     """Draw a map with a single axis as a line, with patches where the variable has no number.
 
-    A variable of words becomes rows of points.
+    A variable of words becomes rows of points. A `marker` is not drawn.
     """
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
     occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
@@ -244,7 +245,10 @@ def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int])
 def _samples(
     axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
 ) -> tuple[list[Panel], str]:
-    """Draw samples over the first two of their keys, and name the other keys that were sampled."""
+    """Draw samples as points over the first two of their keys.
+
+    Also returns a text that names the other keys that were sampled. `marker` is a point to mark, by its values.
+    """
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes

@@ -61,7 +61,7 @@ def headline(runs: xr.Dataset, name: str) -> str:
 
 
 def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
-    """Return the fraction of the map in which a finding holds, and where."""
+    """Say in which fraction of the map a finding holds, and in which range of each axis."""
     holds, completed = _flags(runs, name, finding.words)
     open_words = _open_words(name) & {*text_counts(runs, name)} if finding.words else set()
     if not completed.any():
@@ -137,7 +137,7 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
 
 
 def _percent(part: int, total: int) -> str:
-    """Write a fraction in percent; only exactly none or all is shown as 0 or 100 %."""
+    """Write `part` of `total` in percent; only exactly none or all is shown as 0 or 100 %."""
     share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"
@@ -185,7 +185,7 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
 def caveats(runs: xr.Dataset, name: str) -> list[str]:
     """Say in how many cells peak counts or verdicts disagree with the end of the run.
 
-    The list is empty if there are no such cells, or the map lacks one of the two.
+    The list is empty if there are no such cells, or if the runs lack the variables to compare.
     """
     if name in worded(verdicts=True) and name != "outcome" and {name, "outcome"} <= set(runs.data_vars):
         hidden = int(((runs[name].values == "hunts") & np.isin(runs["outcome"].values, (RESTS, CREEPS))).sum())
@@ -273,9 +273,10 @@ def _spans(axis: CellAxis, value: float) -> bool:
 
 
 def _changes(axis: CellAxis, words: np.ndarray, at: int) -> list[str]:
-    """Return between which cells along an axis hunting begins or ends, next to a cell.
+    """Return between which cells along an axis hunting begins or ends, next to the cell `at`.
 
-    A side on which a cell without a verdict lies nearer gives no result.
+    `words` are the verdicts of the cells, shape (n,). A side gives no text if a cell without a verdict comes first
+    there.
     """
     attracted = np.isin(words, ATTRACTED)
     differ = np.flatnonzero((attracted != attracted[at]) | ~np.isin(words, (*ATTRACTED, *_QUIET)))

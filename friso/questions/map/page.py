@@ -38,8 +38,8 @@ PRINTED = ON_PAGE._replace(noted=False)
 def map_files(runs: xr.Dataset, metric: str, rerun: str, draw: Callable[[], Traces | None]) -> dict[str, Content]:
     """Return the figure in all formats and the page of a map, by suffix in the order of `FORMS`.
 
-    `rerun` is the command that repeats a run, with {indices} for the indices of its cell. `draw` computes the runs that
-    the page shows, while the figure is drawn.
+    `rerun` is the command that repeats a run, with {indices} in place of the indices of its cell. `draw` computes the
+    runs that the page shows, or None if they are too many.
     """
     figure = marked_figure(runs, metric)
     draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
@@ -52,10 +52,10 @@ def map_html(
 ) -> str:
     """Return the page of a sweep, which opens with the variable `metric`.
 
-    `drawn` holds the runs of all cells, of which the page draws the chosen one. `rerun` is the command that repeats a
-    run, with {indices} for the indices of its cell: "friso simulate --cell map.zarr {indices}". `figure` is the figure
-    of the variable, if it is already drawn. Raises ValueError if {indices} is missing, or the runs lack axes or the
-    metric.
+    `drawn` holds the runs of all cells; the page draws the run of the cell that is chosen. `rerun` is the command that
+    repeats a run, with {indices} in place of the indices of its cell: "friso simulate --cell map.zarr {indices}".
+    `figure` is the figure of the variable, if it is already drawn. Raises ValueError if {indices} is missing, or the
+    runs lack axes or the metric.
     """
     if "{indices}" not in rerun:
         raise ValueError(

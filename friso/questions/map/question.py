@@ -77,7 +77,7 @@ LARGE = 10_000_000
 class SweepAnswer(Answer):
     """The runs of a sweep; `result` is an xarray.Dataset with a dimension for each axis.
 
-    `metric` colours its map. `store` is the folder that holds it, or None.
+    `metric` is the variable that colours the map. `store` is the folder of the runs, or None if they are in memory.
     """
 
     study: Study
@@ -362,7 +362,8 @@ def _another_study(store: Path) -> InputError:
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     """Return the relative tolerance of the solver: the user's, or one that is safe for "auto".
 
-    It is then the loosest at which enough outcomes of a sample of cells survive, and is logged.
+    A safe one is the loosest at which enough outcomes of a sample of cells survive. If there is none, the best one
+    tried is taken. The choice is logged.
     """
     settings = StudySettings.current()
     if entry != "auto":
@@ -381,8 +382,9 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
 
 @contextmanager
 def _crew(workers: int | None, scheduler: Address | None) -> Iterator[Crew]:
-    """Provide the workers that run the cells: threads, processes or a Dask cluster.
+    """Provide the workers that run the cells.
 
+    They are threads of this process, or `workers` processes, or those of a Dask `scheduler`, given by its address.
     Raises InputError for a number of workers that cannot be had.
     """
     if workers is not None and scheduler is not None:
@@ -411,11 +413,9 @@ def _filled(
 ) -> tuple[xr.Dataset, bool]:
     """Run the cells that a store lacks; return the runs, and whether the store can be written.
 
-    If the work ends early, a message says how much is stored and how to resume. A complete store that cannot be written
-    is only read.
-
-    With `beside`, figures are written beside the store, which notes their names. Raises StoreError for a store that
-    must be written and cannot be.
+    If the work ends early, a message says how much is stored and how to resume. `share` is the fraction of cells to
+    verify. A complete store that cannot be written is only read, unless figures are to be written `beside` it. Raises
+    StoreError for a store that must be written and cannot be.
     """
     stored = 0
 

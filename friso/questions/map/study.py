@@ -72,8 +72,8 @@ class Varied:
     ) -> Varied:
         """Collect axes from a dictionary and from texts KEY=RANGE, each key once.
 
-        `latin` and `log` say how keys are sampled and spaced. Raises InputError for an axis or a link that is not
-        usable.
+        The texts are `x`, `y` and those in `more`. `latin` and `log` say how keys are sampled and spaced. Raises
+        InputError for an axis or a link that is not usable.
         """
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
         return cls(
@@ -157,7 +157,10 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
 
 def coloured_by(study: Study, metric: str) -> str:
-    """Return the variable that colours the map: the metric, or another that shows it."""
+    """Return the variable that colours the map.
+
+    It is the metric asked for or, if the study has it, the metric that maps show in its place (`Metric.shown_as`).
+    """
     other = metrics()[metric].shown_as
     return other if other in study.metrics else metric
 
@@ -211,8 +214,8 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
     """Refuse to write over anything but earlier results of this study.
 
-    If figure and page are written beside the store, `beside` is the example that a refusal shows. Raises InputError for
-    foreign files, and StoreError for a store with another study; `overwrite` allows both.
+    If figure and page are written beside the store, `beside` is the example in a refusal. Raises InputError for files
+    of others, and StoreError for a store with another study; `overwrite` allows both.
     """
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other
@@ -234,11 +237,11 @@ def write_beside(
 ) -> list[Path]:
     """Write figure, page and exports of a store, all of them or none, and return their paths.
 
-    Files that the store wrote earlier are replaced; other files only with `overwrite`. The store notes the new files
-    first, if it can.
+    Files that the store wrote earlier are replaced; other files only with `overwrite`. With `can_note`, the store notes
+    the digests of the new files first.
 
-    Raises StoreError if another process holds the store or nothing can be noted. Raises OSError if a file cannot be
-    written.
+    Raises StoreError if another process holds the store, or its notes cannot be written. Raises OSError if a file
+    cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
     from friso.studies.store_folder import lock_store
@@ -270,7 +273,7 @@ def _views(store: Path) -> list[Path]:
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
     """Return the files beside a store that are still as the store wrote them.
 
-    They are recognised by the digests that the store notes.
+    Looked at are figure, page and the `exports`. Files are recognised by the digests that the store notes.
     """
     noted = _noted_digests(store)
     named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}

@@ -86,9 +86,9 @@ def word_category(name: str, word: str) -> Category:
 
 
 def no_number(name: str, reason: str | None = None) -> Category:
-    """Return the category of a cell that was run but has no number.
+    """Return the category of a cell that was run but has no number for the metric `name`.
 
-    `reason` is the word of `Metric.reasons` for that cell.
+    `reason` is the cell's word of another metric (`Metric.reasons`), which says why.
     """
     metric = metrics().get(name)
     reasons = categories_of(metric.reasons) if metric and metric.reasons else {}
@@ -120,9 +120,9 @@ def unit_of(array: xr.DataArray) -> str:
 
 
 def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
-    """Return a variable of texts as indices of its shape, and the texts to which these refer.
+    """Return a variable of texts as indices, and the texts to which these refer.
 
-    Texts come in the order in which they occur.
+    The indices have the shape of the variable. Texts come in the order in which they occur.
     """
     import pandas as pd
 

@@ -36,7 +36,10 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """Return the keys of joint and controller that were changed for a log, as texts with units."""
+    """Return the keys of joint and controller in which a log's `machine` differs from the stage.
+
+    The values are texts with units, by key.
+    """
     before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text

@@ -37,8 +37,8 @@ Every module of `friso/questions/rig/experiments/` declares one, and so does eve
 def view_of(experiment: str) -> OutcomeView:
     """Return how to show an experiment's outcome; without a declaration, by its logs alone.
 
-    A declaration of another package that cannot be used is reported and left out, because the experiment has run by
-    then.
+    A declaration that cannot be used, such as that of another package, is reported and left out. An error would lose
+    the experiment, which has already been run.
     """
     try:
         if experiment in OUTCOME_VIEWS:

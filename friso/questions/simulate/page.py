@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:
-    """Return NetCDF with everything, CSV with the samples, and PNG with the plot."""
+    """Return NetCDF with everything, CSV with the samples, and PNG with the plot, named `stem`."""
     return {
         f"{stem}.nc": lambda path: response.to_netcdf(path, engine="scipy"),
         f"{stem}.csv": partial(_write_samples, response),

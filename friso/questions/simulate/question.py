@@ -206,9 +206,9 @@ def simulate(
 
 
 def _cell(store: Path, numbers: list[str], changes: Changes) -> tuple[Stage, str, Study]:
-    """Return the stage of a cell, a name for it, and its study.
+    """Return the stage of a cell with the user's `changes`, a name for its files, and its study.
 
-    Raises InputError for numbers that name no cell of the study.
+    Raises InputError for `numbers` that name no cell of the study.
     """
     from friso.studies.store import read_store
     from friso.studies.study import study_of

@@ -54,7 +54,7 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
     """Describe a run that is off its reference at the end but does not swing.
 
     In the last quarter, the stage was off by at most `farthest` [m], and its peak-to-peak motion was `moved` [m]. At
-    the end it is off by `final` [m]. `grows` is true if it is ever farther off.
+    the end it is off by `final` [m]. `grows` is true if the deviation keeps growing.
     """
     if grows:
         return (

@@ -77,8 +77,8 @@ Lines = Sequence[ShownRemedy]
 def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
     """Return the stages that are drawn, with their lines.
 
-    First comes the stage as it is. The least change and the fastest remedy follow, without and with a bought joint. If
-    none works, unsure remedies are drawn.
+    The stage as it is comes first. Then come the least change and the fastest remedy: of those that need no new joint,
+    then of those that do. If no remedy works, all that have a stage are drawn.
     """
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in _shown(tuning):
@@ -92,7 +92,7 @@ def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
 def _shown(tuning: Advice) -> list[RemedyOutcome]:
     """Select the remedies to plot: the first and the quickest, without and with a bought joint.
 
-    If no remedy works, select all that have a stage.
+    If no remedy works, all that have a stage are selected.
     """
     if not tuning.working:
         return [outcome for outcome in tuning.outcomes if outcome.stage is not None]

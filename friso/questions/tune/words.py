@@ -145,7 +145,10 @@ def answer(tuning: Advice) -> list[str]:
 
 
 def _in_short(tuning: Advice) -> Iterator[str]:
-    """Yield one line on the least change and the fastest remedy with their times, unless equal."""
+    """Yield one line on the least change and the fastest remedy, with their settling times.
+
+    Nothing is yielded if both are the same remedy, or if one of them is missing or was not measured.
+    """
     least, fastest = tuning.least, tuning.fastest
     if least is None or fastest is None or least is fastest:
         return
@@ -158,7 +161,7 @@ def _in_short(tuning: Advice) -> Iterator[str]:
 
 
 def _for_all(tuning: Advice) -> str:
-    """Say that the least change holds for all moves; empty unless another that works does not."""
+    """Write " for all moves" if that is true of the least change, but not of every remedy."""
     least = tuning.least
     every = least is not None and tuning.for_all_moves(least)
     return " for all moves" * (every and not all(map(tuning.for_all_moves, tuning.working)))
@@ -180,7 +183,7 @@ def _least_words(tuning: Advice) -> str:
 
 
 def _of_the_drive(tuning: Advice) -> str:
-    """Say that timing in the table [drive] affects the margin alone, if the file has any."""
+    """Say that timing in the table [drive] counts for the margin alone; empty without timing."""
     has = {"sample_time", "delay", "current_bandwidth"} & {*tuning.as_built.get("drive", ())}
     return " The [drive] of the file counts for the margin alone, not for moves and hunting." if has else ""
 
@@ -310,7 +313,7 @@ def size_words(size: ChangeSize) -> str:
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
-    """Say how many machines meet the goal and how fast, beside the stage as it is."""
+    """Say how many machines meet the goal and how fast, compared with the stage as it is."""
     before = slowest_time(tuning.present, tuning.goal)
     as_is = "" if measured is tuning.present or before == ABSENT else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
@@ -339,7 +342,7 @@ def _holds(measured: Performance, goal: Goal) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """Say what a remedy costs beside the stage as it is: force, margin and stiffness.
+    """Say what a remedy costs compared with the stage as it is: force, margin and stiffness.
 
     If it `buys_joint`, the text adds that standstill was not computed.
     """
@@ -446,9 +449,9 @@ def failing(tuning: Advice) -> list[str]:
 
 
 def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
-    """Tell whether a search over bandwidth failed although another remedy found a bandwidth.
+    """Tell whether a search over bandwidth alone failed, but another remedy found a bandwidth.
 
-    The other remedy works, and its stage differs from the one before in bandwidth alone.
+    The other remedy works, and its stage differs in bandwidth alone from the stage as it is.
     """
     key = tuning.stage.controller.bandwidth_key
     if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
@@ -490,10 +493,10 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
-    """Yield sentences on why no setting of a remedy meets the goal; the first one is the reason.
+    """Yield sentences on why no setting of a remedy meets the goal; only the first one counts.
 
-    Each names a part of the goal that no setting meets, of those that meet the parts before. If some settings meet all
-    parts, the sentence says that none surely does on fresh machines, or that it is not known whether they hunt.
+    The parts of the goal are checked in order. The first sentence names the part at which no setting is left. If some
+    settings meet all parts, it says that none surely does on fresh machines, or that it is not known whether they hunt.
     """
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin, best = f"a modulus margin of {goal.margin:g}", float(points.margin.max(initial=0.0))
@@ -539,9 +542,9 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
 
 
 def _edges(tuning: Advice) -> str:
-    """Say at which bandwidth hunting ends, and up to which one there is enough margin.
+    """Say at which bandwidth hunting ends, and up to which bandwidth the margin is enough.
 
-    A bandwidth that is not known is left out; if none is known, the text is empty.
+    The user's limit of the bandwidth is added. What is not known is left out; if nothing is known, the text is empty.
     """
     edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
     parts = []
@@ -585,7 +588,10 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
 
 
 def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
-    """Return the texts of one row of the table: how machines perform, under `COLUMNS`."""
+    """Return the texts of one row of the table: how machines perform, under `COLUMNS`.
+
+    The first text is `works`, which says whether the remedy works.
+    """
     goal = tuning.goal
     return [
         works,

@@ -31,8 +31,8 @@ MORE = VIRIDIS[::-1]
 class ColourScale:
     """Colours of the drawn numbers from `low` to `high`.
 
-    There are even `steps`, or else the colours blend into each other. `ticks` (drawn numbers) and `texts` are written
-    at the colour bar; without them the renderer chooses.
+    With `steps`, each colour fills an equal part of the range; otherwise the colours blend into each other. `ticks`
+    (drawn numbers) and `texts` are written at the colour bar; without them the renderer chooses.
     """
 
     low: float

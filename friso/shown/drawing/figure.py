@@ -124,7 +124,7 @@ class Limit:
 class Category:
     """A word in place of a number, with one flat colour.
 
-    It is a verdict, or the reason for a missing number.
+    The word is a verdict, or the reason for a missing number.
     """
 
     label: str
@@ -135,8 +135,8 @@ class Category:
 class Coloured:
     """Points x, y coloured by the number z [unit] or, where there is one, by a category.
 
-    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. `colours`, if given,
-    are instead the colours of the whole numbers 0, 1, 2, ... `codes`, of the shape of z, are numbers of `categories`;
+    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`. If `colours` are given,
+    they are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, are indices into `categories`;
     where a code is NaN, z counts.
     """
 

@@ -41,9 +41,9 @@ ON_PAGE = Image("svg", headed=False)
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """Return an image of a figure as the bytes of a file, with or without heading and note.
+    """Return an image of a figure as the bytes of a file.
 
-    `form` is one of FORMATS. Raises ValueError for any other.
+    It has the heading if `headed`, and the note if `noted`. `form` is one of FORMATS. Raises ValueError for any other.
     """
     if artists := _ARTISTS.get():
         drawn = artists.drawn(figure, Image(form, headed, noted))

@@ -39,7 +39,7 @@ def draw_coloured(axes: Axes, panel: Panel) -> None:
 def _add(
     axes: Axes, panel: Panel, field: Coloured, values: Array, colours: Colormap, limits: tuple[float, float]
 ) -> QuadMesh | PathCollection:
-    """Draw one layer of a map or cloud; places without a value stay empty."""
+    """Draw the numbers or the categories of a map or cloud; places without one stay empty."""
     style = {"cmap": colours, "norm": Normalize(*limits), "rasterized": np.size(values) > _VECTORS}
     if isinstance(field, Map):
         x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)

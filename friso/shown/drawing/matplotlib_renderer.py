@@ -95,7 +95,7 @@ _SYMBOLS: dict[str, dict[str, Any]] = {
 def render(figure: Figure) -> Canvas:
     """Draw a figure on a matplotlib canvas.
 
-    Its lines carry the arrays of `drawable(figure)`, in that order.
+    The lines on the canvas carry the arrays of `drawable(figure)`, in that order.
     """
     with _style():
         prepared = drawable(figure)
@@ -141,9 +141,10 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
 
 
 def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
-    """Return the figure as the bytes of a file, with or without heading and note.
+    """Return the figure as the bytes of a file.
 
-    `form` is one of FORMATS. Raises ValueError for any other.
+    The image has the heading if `headed`, and the note if `noted`. `form` is one of FORMATS. Raises ValueError for any
+    other.
     """
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
@@ -152,7 +153,7 @@ def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) ->
 
 
 class _LaidOut:
-    """A figure on a canvas whose parts have their places."""
+    """A figure that was drawn on a canvas once, so that all its parts have fixed places."""
 
     def __init__(self, figure: Figure) -> None:
         """Draw the figure once, which fixes the places of its parts."""
@@ -164,9 +165,10 @@ class _LaidOut:
         self.notes = [text for text in self.canvas.texts if text is not self.heading]
 
     def image(self, form: str, headed: bool, noted: bool) -> bytes:
-        """Return the figure as the bytes of a file.
+        """Return the figure as the bytes of a file in the format `form`.
 
-        Page and file show one drawing of the same lines and letters.
+        Without `headed` or `noted`, heading or note is cut off. All images show one drawing of the same lines and
+        letters.
         """
         height = self.canvas.get_figheight()
         low = 0.0 if noted else LINE * len(self.notes)

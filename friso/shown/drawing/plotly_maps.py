@@ -31,7 +31,7 @@ SYMBOLS: dict[str, dict[str, Any]] = {
 
 
 def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
-    """Return the panels that have a colour bar, and whether one bar serves all of them."""
+    """Return the indices of the panels with a colour bar, and whether one bar serves all panels."""
     bars = {
         number: (scale(field), field.label)
         for number, panel in enumerate(panels)
@@ -60,7 +60,7 @@ def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | N
 
 
 def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, Any], place: dict[str, Any]) -> Any:
-    """Return one layer of a map or cloud; places without a value stay empty."""
+    """Return the trace of a map's or cloud's numbers or categories; cells without one are empty."""
     where = f"{_hover('x', panel.x)}, {_hover('y', panel.y)}"
     if values is not field.codes:
         where += f": %{{customdata:.4~g}} {html.escape(field.unit)}"

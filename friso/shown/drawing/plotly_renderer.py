@@ -203,9 +203,10 @@ class _Head:
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
 
     def over(self, left: float, top: float) -> dict[str, Any]:
-        """Return the legend as plotly takes it, above axes at a place in fractions of the figure.
+        """Return the legend as plotly takes it, with the title above the legend's entries.
 
-        The title stands above the entries, which take fewer rows if there is more room.
+        The legend stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure. The
+        entries take fewer rows if there is more room.
         """
         place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
         kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
@@ -214,7 +215,7 @@ class _Head:
     def alone(self, left: float, top: float) -> dict[str, Any]:
         """Return the title as plotly takes it without a legend.
 
-        It stands above axes at a place in fractions of the figure.
+        The title stands above axes whose upper left corner is at `left` and `top`, as fractions of the figure.
         """
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
         return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
@@ -257,7 +258,10 @@ def _add_panel(
     y_domain: tuple[float, float],
     links: dict[Axis, str],
 ) -> None:
-    """Add the axes of a panel; panels with equal x axes are zoomed together."""
+    """Add the axes of a panel; panels with equal x axes are zoomed together.
+
+    `x_domain` and `y_domain` are the place of the panel, as fractions of the figure.
+    """
     suffix = _suffix(number)
     shape = {"constrain": "domain"} if panel.equal else {}
     x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
@@ -298,8 +302,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
 def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     """Return the ticks of a logarithmic axis.
 
-    They are decades, with 2 and 5 or more between them if decades are too few; plotly itself would write 0.5 as "5". If
-    even these are too few, there are about five round numbers.
+    Ticks stand at decades, and at 2 and 5 or more numbers between them if decades are too few. Plotly itself would
+    write 0.5 as "5". If all these are too few, there are about five round numbers.
     """
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:
@@ -330,21 +334,21 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of a filled band."""
+    """Return the trace of a filled band, on the axes in `place`."""
     x, y = band.outline
     style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
     return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of a line."""
+    """Return the trace of a line, on the axes in `place`."""
     style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
     return {**drawn, **_text(line.label, panel), **place}
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
-    """Return the trace of single points."""
+    """Return the trace of single points, on the axes in `place`."""
     style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
     return {**drawn, **_text(marker.label, panel), **place}

@@ -127,13 +127,13 @@ def plus_minus(half: float, unit: str, digits: int = 3) -> str:
 
 
 def share_with_interval(share: Share) -> str:
-    """Write a fraction and its interval in percent; only exact fractions look like 0 or 100 %."""
+    """Write a fraction and its interval in percent; only exactly 0 and 1 become 0 and 100 %."""
     middle = f"{percentage(share.probability)} %" if math.isfinite(share.probability) else "unknown"
     return f"{middle} ({percentage(share.low)} to {percentage(share.high)} %)"
 
 
 def percent_range(low: float, high: float) -> str:
-    """Write two fractions in percent with one sign."""
+    """Write two fractions in percent, with one percent sign for both."""
     return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 

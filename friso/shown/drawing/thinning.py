@@ -39,7 +39,7 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
 
 
 def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:
-    """Return the first sample of every bucket, strictly rising."""
+    """Return the index of the first sample of every bucket, strictly rising."""
     count = len(x)
     if not np.any(np.diff(x) < 0):
         return count * np.arange(buckets) // buckets

@@ -30,11 +30,13 @@ CLOSER, WITHIN = 2, 9
 class MachineMeasures:
     """Measures of the runs of machines, arrays of shape (count,).
 
-    - `outcome`: words of `friso.hunting.criteria.run_outcome`, with the tolerance as band; `counted`: distinct peaks.
-    - `settling` [s]: longest time to settle at a place (`friso.hunting.criteria.settling`). It is infinite if the
-      machine swings, creeps, or is not in position at the far end of its motion when it returns.
-    - `in_position` [m]: root mean square of the deviation in the last quarter of the run.
-    - `force` [N]: root mean square of the commanded force over the whole run.
+    Runs that were not completed have NaN, and no peaks. `outcome` are words of `friso.hunting.criteria.run_outcome`,
+    with the tolerance as band, and `counted` the distinct peaks. `settling` [s] is the longest time to settle at a
+    place (`friso.hunting.criteria.settling`); infinite if the machine swings, creeps, or is not in position at the far
+    end of its motion when it returns.
+
+    `in_position` [m] is the root mean square of the deviation in the last quarter of the run. `force` [N] is the root
+    mean square of the commanded force over the whole run.
     """
 
     outcome: np.ndarray

@@ -37,8 +37,8 @@ class NeededBandwidth:
     def turning(self, enough: float) -> int | None:
         """Return the index of the bandwidth from which on enough machines come to rest.
 
-        `enough` is the fraction of machines that counts as enough. Returns None if the highest bandwidth does not reach
-        it.
+        `enough` is the fraction of machines that counts as enough. Returns None if the fraction at the highest
+        bandwidth is smaller.
         """
         missed = np.flatnonzero(self.shares < enough)
         first = int(missed[-1]) + 1 if missed.size else 0

@@ -166,8 +166,9 @@ class CompareOptions:
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys from which the linear loops of machines are computed, with SI values.
 
-    `flat` has the machines' keys. All machines have the stage's current loop. The ratio of true to assumed motor
-    constant becomes a factor of the controller's gains. The cable is left out.
+    `flat` has the machines' keys. The drive's loop for the motor current has the bandwidth of the `stage` on all
+    machines. The ratio of true to assumed motor constant becomes a factor of the controller's gains. The cable is left
+    out.
     """
     current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)

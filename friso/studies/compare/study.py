@@ -125,9 +125,10 @@ class OptionResult:
 
     @property
     def rests(self) -> bool:
-        """Tell whether the option brings `ENOUGH` machines into position, and they stay there.
+        """Tell whether enough machines come into position with the option, and stay there.
 
-        Machines that were run for longer show whether they stay; without such runs the result is false.
+        `ENOUGH` is the fraction required of all machines in position, and of those run for longer that stay. Without
+        longer runs the result is false.
         """
         in_position = self.in_position_count >= ENOUGH * len(self.measures.settling)
         return bool(in_position and self.later.stays.size and self.later.stays.mean() >= ENOUGH)
@@ -137,10 +138,11 @@ class OptionResult:
 class Paired:
     """An option compared with option a, on the same machines.
 
-    `swinging` is the increase in the probability of swinging at the end. `sooner` and `later` are the fractions of
-    machines that are in position sooner or later than with option a. `alike` is the fraction that is so at the same
-    time, or never with both. `in_position` and `force` are medians over the machines, of the option's value divided by
-    that with option a. The values are the root mean square deviation in position, and the root mean square force.
+    `swinging` is the increase in the probability of swinging at the end. `sooner`, `later` and `alike` are fractions of
+    machines: in position sooner or later than with option a, or at the same time (or never with both).
+
+    `in_position` and `force` are medians over the machines, of the option's value divided by that with option a. The
+    values are the root mean square deviation in position, and the root mean square force.
     """
 
     swinging: EstimatedValue
@@ -155,8 +157,9 @@ class Paired:
 class Comparison:
     """Results of all options on machines drawn with a seed.
 
-    A machine is in position `within` a tolerance [m]. `needed` gives the bandwidth that the controller alone needs. No
-    faster controller exceeds `bandwidth_limit` [Hz]. An interruption skipped the options in `not_run`.
+    A machine is in position `within` a tolerance [m]. `needed` says how many machines come to rest over the bandwidth
+    of the controller alone; None if that was not computed. No faster controller exceeds `bandwidth_limit` [Hz]. An
+    interruption skipped the options in `not_run`.
     """
 
     machines: Machines
@@ -276,7 +279,7 @@ class _Work:
     options: int
 
     def runs(self, option: Option, before: int) -> MachineMeasures:
-        """Run an option on all machines and measure them, after `before` other options."""
+        """Run an option on all machines and measure them; `before` other options were run already."""
         count, parts = self.machines.count, []
         label, total = option.label, count * self.options
         self.progress(before * count, total, label)

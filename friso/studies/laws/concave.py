@@ -69,7 +69,7 @@ def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
 def knots_of(x: np.ndarray) -> np.ndarray:
     """Return the knots at which a curve through points, shape (m,), may bend.
 
-    They are all points but 0, or some of them: closer together near 0, but not closer than the scatter of x.
+    The knots are all points but 0, or some of them: closer together near 0, but not closer than the scatter of x.
     """
     settings = StudySettings.current()
     back = np.minimum(np.diff(x), 0.0)
@@ -88,8 +88,9 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
     """Yield concave curves through points x and y, both (m,), that reach the value `end`.
 
-    Fits use straight parts and, for many points, bent parts too, with the first few knots left out one after the other.
-    Beyond the points a curve continues with its final slope, at most as far again.
+    Fits use straight parts and, for many points, bent parts too. The first fit uses all knots, and each further one
+    leaves out one more knot near 0, until fits are far worse than the best. Beyond the points a curve continues with
+    its final slope, at most as far again.
     """
     settings = StudySettings.current()
     knots = knots_of(x)
@@ -114,7 +115,7 @@ def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFi
 def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Return the equations of the least-squares fit, reduced to as few rows as unknowns.
 
-    Their shape is (2 n + 1, 2 n + 1) at most for n knots, with the right-hand side last.
+    For n knots the shape is (2 n + 1, 2 n + 1) at most; the last column is the right-hand side.
     """
     return np.asarray(np.linalg.qr(np.column_stack([_shapes(x, knots), y]), mode="r"))
 

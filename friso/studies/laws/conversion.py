@@ -46,8 +46,8 @@ energy lost in a hysteresis loop before sliding, and the loop's stiffness from e
 class MeasuredChange:
     """A measured quantity `before` and `after` the conversion of a friction law [unit].
 
-    `off` is its error: relative to static friction for curves, and relative to the number itself for numbers. An error
-    of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
+    `off` is the error by the conversion: relative to static friction for curves, and relative to the number itself for
+    numbers. An error of at most `allowed` counts as none. `amplitude` [m] is that of a hysteresis loop.
     """
 
     kind: MeasuredKind
@@ -121,7 +121,7 @@ def convert(
 
     A law with parallel elements gets `elements` of them. Before sliding, the stage's own law counts as measured, or the
     points in the file `virgin`. Raises InputError for a law to which friction cannot be converted, and for a stage
-    whose own law does not stick. It is also raised for a file without a usable virgin curve.
+    whose own law does not stick. A file without a usable virgin curve also raises it.
     """
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"
@@ -198,7 +198,7 @@ def _loops(source: Stage, made: Stage, before: MeasuredFriction) -> Iterator[Mea
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return the table [friction] of a stage file for a law and its keys [SI].
 
-    Its units are those of the stage's axis.
+    Values are written in the units of the stage's axis.
     """
     cls, kind = friction_law(law), stage.axis_kind
     table: dict[str, Any] = {"model": law}

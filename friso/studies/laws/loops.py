@@ -19,8 +19,8 @@ from friso.studies.settings import StudySettings
 class HysteresisLoop:
     """A loop of force over displacement, with an `amplitude` [m] to either side of rest.
 
-    It encloses the `area` [J], the energy lost in one period. `stiffness` [N/m] is the difference of the forces at both
-    ends, divided by the difference of the displacements.
+    The loop encloses the `area` [J], the energy lost in one period. `stiffness` [N/m] is the difference of the forces
+    at both ends, divided by the difference of the displacements.
     """
 
     amplitude: float

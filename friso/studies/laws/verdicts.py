@@ -64,8 +64,8 @@ class Trial:
 class LawVerdict:
     """The verdict on a stage under one friction law.
 
-    It has the conversion to the law, and one trial for each choice of values for the keys that the conversion leaves
-    open.
+    Fields are the conversion to the law, and one trial for each choice of values for the keys that the conversion
+    leaves open.
     """
 
     conversion: LawConversion
@@ -175,9 +175,9 @@ class VerdictsByLaw:
     def deciding(self, case: str) -> list[str]:
         """Return the experiments that would decide whether the stage hunts in a case.
 
-        There are none if all laws agree, or if no answer is certain. If the answer depends on keys left open in a law,
-        the experiments determine the keys. Otherwise they separate the laws that disagree, or are not certain, from the
-        others.
+        There are none if all laws agree, or if no answer is certain. If the answer depends on keys that measurements
+        leave open in a law, the experiments determine these keys. Otherwise, the experiments separate the laws that
+        disagree, or are not certain, from the others.
         """
         if self.hunts(case) is not None or not self.answers(case):
             return []
@@ -254,10 +254,10 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
 def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
     """Return friction keys of stages under each other law that keeps their measured friction.
 
-    The stages differ in numbers of their friction. The keys' values [SI] are as converted and, for each key that
-    measurements leave open, at both ends of its range. They come by the names of law and key. A law that keeps the
-    measured friction of some stages only is listed as lost, with the numbers of the others. Raises InputError for a
-    stage whose law cannot say what would be measured.
+    The stages differ only in numbers of their friction. The keys come with SI values, by a name of the law: as
+    converted and, if measurements leave keys open, also with all of these at the lower or at the upper end of their
+    ranges. A law that keeps the measured friction of some stages only is listed as lost, with the indices of the
+    others. Raises InputError for a stage whose law cannot say what would be measured.
     """
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions, lost = {}, {}
@@ -285,8 +285,8 @@ def _together(values: Sequence[Any]) -> Any:
 def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
     """Return the values [SI] to try for the keys that measurements leave open, by trial.
 
-    The trial "" is as converted; "least" and "most" are at the ends of each key's range. The stage's own law has one
-    trial.
+    The trial "" is as converted. In the trials "least" and "most", all open keys are at the lower or the upper ends of
+    their ranges. The stage's own law has one trial.
     """
     trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:

@@ -117,7 +117,7 @@ def with_virgin_curve(
     """Replace the virgin curve of measured friction by points [m, N], both of shape (n,).
 
     The new curve is the nearest one of springs that slip one after the other: concave, from 0 to static friction, by
-    least squares. It is straight between few points and smooth through many. Also returns the points with their
+    least squares. The curve is straight between few points and smooth through many. Also returns the points with their
     scatter. Raises InputError for points that contradict static friction.
     """
     settings = StudySettings.current()
@@ -160,5 +160,8 @@ def with_virgin_curve(
 
 
 def _scatter(residual: np.ndarray) -> float:
-    """Return the standard deviation of the rough part of a curve's residual, shape (n,)."""
+    """Return the standard deviation of a curve's residual, shape (n,), without slow changes.
+
+    Differences of neighbouring values show it.
+    """
     return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2))

@@ -58,10 +58,10 @@ def excite(
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
 ) -> RecordedRuns:
-    """Run the stage at a standstill at a place [m], with the multisine of a seed injected.
+    """Run the stage at a standstill at a place [m], and inject a multisine as a force.
 
-    `changes` of keys are arrays of shape (runs,), and `kind` the sizes of the multisine. Returns the recorded runs,
-    which share a seed.
+    `seed` draws the phases of the multisine and the noise, and `kind` has the sizes of the multisine. `changes` of keys
+    are arrays of shape (runs,). Returns the recorded runs, which share the seed.
     """
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow

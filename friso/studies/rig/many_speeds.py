@@ -55,8 +55,8 @@ stage's own crossover (2 ms)."""
 class PlaceOnRail:
     """Passes at many speeds over one stretch of the rail.
 
-    It has the log and its evaluation. `true` is the true mean friction [N] over the stretch, with a cable's drag, at
-    `speeds` [m/s], both of shape (n,).
+    Fields are the log, and `velocity`, its friction over velocity. `true` is the true mean friction [N] over the
+    stretch, with a cable's drag, at `speeds` [m/s], both of shape (n,).
     """
 
     log: RigLog

@@ -263,9 +263,9 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
     """Return the shape of the swings in a run's last half: five numbers.
 
-    They are `above`, `below`, `rising`, `period_scatter` and `height_scatter` of `RailRuns`. They follow from turning
-    points, times [s] and values [m], and the `swing` peak to peak. The run `ended` at a time [s]. All are NaN if the
-    run does not swing, or has fewer than three swings to either side.
+    The numbers are `above`, `below`, `rising`, `period_scatter` and `height_scatter` of `RailRuns`. They follow from
+    turning points, times [s] and values [m], and the `swing` peak to peak. The run `ended` at a time [s]. All are NaN
+    if the run does not swing, or has fewer than three swings to either side.
     """
     nothing = (np.nan,) * 5
     if not lasts(np.asarray(swing), 0.0, BAND):

@@ -56,7 +56,8 @@ class Outcome:
 def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
     """Return one run of a chunk, in `row`, as a log up to a failure.
 
-    It ends early too if the command swings between its limits from then on.
+    The log also ends early if, from some time on, the command only swings between its limits. `kind` is the kind of
+    experiment for `friso identify` (None: recognised from the log).
     """
     status = int(recorded.statuses[row])
     count = recorded.logged["position"].shape[1]

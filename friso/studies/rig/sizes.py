@@ -101,7 +101,7 @@ def travel(stage: Stage) -> tuple[float, float]:
 
 
 def longest_travel(stage: Stage) -> float:
-    """Return the length [m] of the way at constant speed."""
+    """Return the length [m] of the way at constant speed, a fixed fraction of the travel."""
     low, high = travel(stage)
     return WAY * (high - low)
 
@@ -114,7 +114,7 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
 def interval(stage: Stage, length: float) -> float:
     """Return a log's sample time [s]: at most `length`, in whole samples of the drive.
 
-    It is at least one such sample, even if that is longer than `length`.
+    The sample time is at least one such sample, even if that is longer than `length`.
     """
     step = as_built_keys(stage)["drive.sample_time"]
     return max(1, int(length / step * (1 + 1e-9))) * step

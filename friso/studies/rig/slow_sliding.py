@@ -84,9 +84,9 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
-    """Return speeds [m/s] at the limit of steady motion, or low ones if all passes were steady.
+    """Return rising speeds [m/s] on both sides of the limit of steady motion.
 
-    `passed` are the logs of passes at many speeds.
+    `passed` are the logs of passes at many speeds. If all passes were steady, some of the lowest speeds are returned.
     """
     speeds = controller_speeds(passed[0].stage)
     unsteady = {

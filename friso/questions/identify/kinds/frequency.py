@@ -29,9 +29,9 @@ def _sentences(bench: Bench) -> tuple[str, ...]:
 
 
 def _friction(bench: Bench) -> str:
-    """Say which part of the response's departure from the linear model friction explains.
+    """Say how much of the response's departure from the linear model friction explains.
 
-    This part was computed with a simulated mass with Coulomb friction on a spring.
+    The fraction is that of a simulated mass with Coulomb friction on a spring.
     """
     assert bench.explanation is not None
     share = 1 - bench.explanation.left
@@ -97,7 +97,7 @@ def _without_units(force: str, motion: str) -> str:
 
 
 def _outputs(errors: Sequence[float]) -> str:
-    """Write the relative errors of the outputs, the driven mass's first."""
+    """Write the relative errors of a predicted response: of the driven mass, then of the other."""
     names = ("driven mass", "other mass")
     return ", ".join(f"{percent(error, 3)} ({name})" for name, error in zip(names, errors, strict=False))
 
@@ -134,7 +134,7 @@ def _line_numbers(line: StraightLine) -> dict[str, Any]:
 
 
 def _drag_numbers(drag: Drag) -> dict[str, Any]:
-    """Return the friction level at low frequency, for the document."""
+    """Return mass, damping, stiffness and Coulomb friction at low frequency, for the document."""
     several = {"mass": drag.mass, "damping": drag.damping, "stiffness": drag.stiffness, "coulomb": drag.coulomb}
     return {
         **{name: estimate_document(estimate) for name, estimate in several.items()},

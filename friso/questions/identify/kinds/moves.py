@@ -147,10 +147,10 @@ def _profile_numbers(profile: Profile) -> dict[str, Any]:
 
 
 def _headline(moves: IdentifiedMoves) -> str:
-    """List what is identified if the force is not in newtons, as it must be in a stage file.
+    """Say what is identified from a log whose force is not in newtons; empty for newtons.
 
-    Values are then in units of that force; the sentence says how to give its scale. For a force in newtons, the
-    sentence is empty.
+    Values are in units of that force. A stage file needs newtons, so the sentence says how to give the scale of the
+    force.
     """
     if moves.force_unit == "N":
         return ""
@@ -162,9 +162,9 @@ def _headline(moves: IdentifiedMoves) -> str:
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
-    """Say how well another log is predicted.
+    """Say how well another log is predicted, by relative errors of its signals.
 
-    The sentence also says how far machines drawn from the estimates differ from it.
+    The sentence also says how far the simulation of machines drawn from the estimates lies apart.
     """
     settings = OutputErrorSettings.current()
     errors, apart = simulated.errors, simulated.apart

@@ -15,7 +15,7 @@ from friso.shown.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, S
 
 
 def _facts(result: Presliding) -> Facts:
-    """List mass and bristles, and how much of the force they explain."""
+    """List stiffness and damping of the bristles, the moving mass, and friction not explained."""
     facts = [
         ("Stiffness of the bristles", with_interval(result.stiffness)),
         ("Damping of the bristles", with_interval(result.damping)),
@@ -27,7 +27,7 @@ def _facts(result: Presliding) -> Facts:
 
 
 def _numbers(result: Presliding) -> dict[str, Any]:
-    """Return mass and bristles, for the document."""
+    """Return the mass, and stiffness and damping of the bristles, for the document."""
     several = {"stiffness": result.stiffness, "damping": result.damping, "mass": result.mass}
     return {
         **{name: estimate_document(estimate) for name, estimate in several.items()},
@@ -47,7 +47,7 @@ def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figu
 
 
 def presliding_caption(result: Presliding) -> str:
-    """Say what the bristles are, and how much of the force they explain."""
+    """Say how stiff and damped the bristles are, and how much of the friction stays unexplained."""
     return (
         f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
         f"{with_interval(result.damping)}. {percent(result.unexplained, 3)} of the friction remains unexplained."

@@ -21,7 +21,7 @@ POINTS, CURVE = 5000, 200
 
 
 def _facts(result: SlowSliding) -> Facts:
-    """List friction over speed, and how much of it the model explains."""
+    """List Coulomb and static friction and Stribeck velocity, and how much stays unexplained."""
     names = ("Coulomb friction", "Static friction", "Stribeck velocity")
     facts = [(name, with_interval(estimate)) for name, estimate in zip(names, result.estimates, strict=True)]
     if len(result.time):
@@ -30,7 +30,7 @@ def _facts(result: SlowSliding) -> Facts:
 
 
 def _numbers(result: SlowSliding) -> dict[str, Any]:
-    """Return friction over speed, for the document."""
+    """Return Coulomb and static friction and the Stribeck velocity, for the document."""
     named = {estimate.name.removeprefix("friction."): estimate_document(estimate) for estimate in result.estimates}
     return {**named, "unexplained": result.unexplained, "warnings": list(result.warnings)}
 
@@ -44,7 +44,7 @@ def _figures(result: SlowSliding, logs: Sequence[Source], name: str) -> list[Fig
 
 
 def slow_sliding_caption(result: SlowSliding) -> str:
-    """Say what the friction is, and how much of it the model explains."""
+    """Write Coulomb and static friction and Stribeck velocity, and how much stays unexplained."""
     coulomb, static, stribeck = (with_interval(estimate) for estimate in result.estimates)
     return (
         "Force less inertia, and the friction of LuGre bristles in the measured motion. Coulomb "

@@ -33,7 +33,7 @@ def _sentences(result: StepStiffness) -> tuple[str, ...]:
 
 
 def _numbers(result: StepStiffness) -> dict[str, Any]:
-    """Return the stiffness with its settled windows, for the document."""
+    """Return the stiffness, and the times at rest from which it follows, for the document."""
     windows = [
         {"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in result.windows
     ]

@@ -78,7 +78,10 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
-    """Draw magnitude over phase of all identifications, their average and the mass line."""
+    """Draw the magnitude of a plant, and its phase below.
+
+    Shown are all single identifications, their average and, if there is one, the mass line.
+    """
     hertz, average = plant.averaged.frequency, plant.averaged.response
     singles = [single.response for single in plant.single]
     angles = [_turned(single, average) for single in singles]

@@ -45,7 +45,7 @@ AFTERWARDS = 5.0
 
 
 def rails_text(share: Share, count: int) -> str:
-    """Write a fraction of rails with its interval."""
+    """Write on how many of `count` rails something happens, with the interval of the fraction."""
     return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
 
 

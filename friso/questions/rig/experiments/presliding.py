@@ -31,7 +31,7 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _place(result: Presliding) -> str:
-    """Write the bristles identified at one place."""
+    """Write stiffness and damping of the bristles, and the mass, as identified at one place."""
     estimates = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
     return "; ".join(
         f"{words} {with_interval(estimate)}" if estimate.determined else f"{words} not shown ({estimate.reason})"

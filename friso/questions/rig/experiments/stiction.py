@@ -33,7 +33,10 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def rails_within_interval(result: Stiction) -> np.ndarray:
-    """Tell on which rails the interval holds the mean of the true static friction, shape (rails,)."""
+    """Tell on which rails the estimated interval contains the true static friction, (rails,).
+
+    The true value is the middle between the least and the greatest friction on the rail.
+    """
     middles = result.true.mean(axis=1)
     return np.array([slips.static.holds(middle) for slips, middle in zip(result.by_rail, middles, strict=True)])
 

@@ -29,8 +29,8 @@ DURATIONS = (480.0, 120.0)
 class Passes:
     """Results of passes at constant speed along the rail, with the joint "free" or "locked".
 
-    They are friction over position and friction over velocity. `true` is the true mean dynamic friction [N] over the
-    way, at the two speeds, shape (2,).
+    Fields are the log, and friction over position and over velocity. `true` is the true mean dynamic friction [N] over
+    the way, at the two speeds, shape (2,).
     """
 
     name: str

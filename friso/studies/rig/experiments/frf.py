@@ -1,6 +1,7 @@
 """Frequency responses of the plant, locked at ten places and free, and of open loops.
 
-They are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29), open loops at several crossovers.
+All are measured by closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29). The open loops are measured at several
+crossovers.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ The duration is in periods of the stage's crossover. A loop with a larger error 
 class Plant:
     """The plant as identified from several logs: one response each, and their average.
 
-    It has the frequency [Hz] of the first mode of a free joint (NaN: locked). `mass` is that of the mass line (where
-    force over acceleration is constant), and `band` its frequency range [Hz].
+    `first_mode` [Hz] is the frequency of the first mode of a free joint (NaN: locked). `mass` is that of the mass line
+    (where force over acceleration is constant), and `band` its frequency range [Hz].
     """
 
     single: tuple[FrequencyResponse, ...]
@@ -74,7 +75,7 @@ class MeasuredLoop:
 
     @property
     def measured(self) -> bool:
-        """Tell whether a response was measured, so the closed loop was stable."""
+        """Tell whether there is a response, which means that the closed loop was stable."""
         return len(self.response.frequency) > 0
 
 
@@ -82,9 +83,9 @@ class MeasuredLoop:
 class Frf:
     """Results of the frequency-response experiment.
 
-    They are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2, ratios),
-    are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings` [Hz], shape
-    (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
+    Fields are the plants, and the open loops, locked at several crossovers and free. `apparent` [kg], shape (2,
+    ratios), are the masses that the locked and the free plant show for the motor constants of `RATIOS`. `settings`
+    [Hz], shape (STEPS,), are crossovers tried with the free joint, and `stable` says which of them were stable.
     """
 
     locked: Plant
@@ -155,7 +156,7 @@ def open_loops(
 ) -> tuple[tuple[RigLog, ...], tuple[MeasuredLoop, ...]]:
     """Return logs of one excitation at several crossovers of the controller, and their loops.
 
-    `settings` are these crossovers over the stage's own.
+    The stage stands at a `place` [m]. `settings` are the crossovers over the stage's own.
     """
     factors = np.array(settings)
     recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))
@@ -221,7 +222,7 @@ def mass_between(response: FrequencyResponse, low: float, high: float) -> Estima
 def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
     """Return the masses [kg] that a stage's response shows for the motor constants of `RATIOS`.
 
-    The response is measured at a place [m] on the rail.
+    The result has the shape (ratios,). The response is measured at a place [m] on the rail.
     """
     ratios = np.array(RATIOS)
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
@@ -232,9 +233,10 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
 
 
 def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the crossovers [Hz] tried, and which of them brought the stage to its reference.
+    """Return the crossovers [Hz] tried, and which of them are stable, both of shape (STEPS,).
 
-    The stage is released beside its reference, at a place [m].
+    The stage is released beside its reference, at a place [m]. A crossover counts as stable if the stage is not farther
+    off in the last quarter of the run.
     """
     factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
     off = RELEASED * stage.flat()["joint.stroke"] / WIDE

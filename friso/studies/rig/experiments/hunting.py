@@ -52,7 +52,7 @@ CASES = {"locked": True, "free": False}
 
 @dataclass(frozen=True)
 class Trace:
-    """Deviation from the end of the move [m] over `time` [s], both of shape (n,)."""
+    """Position minus the reference at its end [m] over `time` [s], both of shape (n,)."""
 
     time: np.ndarray
     deviation: np.ndarray
@@ -62,8 +62,8 @@ class Trace:
 class Startable:
     """A machine that comes to rest `after_move`, but swings after a release, `after_release`.
 
-    After the move no peaks are counted; after the release it swings to the end. It has its crossover [Hz], the index of
-    its rail, and the `displacement` [m] of the release.
+    After the move no peaks are counted; after the release it swings to the end. `crossover` [Hz] is its crossover,
+    `rail` the index of its rail, and `displacement` [m] where it is released.
     """
 
     after_move: Trace
@@ -78,12 +78,14 @@ class HuntingResult:
     """Results of the hunting experiment.
 
     `distance` [m] is the length of the move. `cases` are the outcomes of the moves, joint locked and free, arrays of
-    shape (crossovers, rails). They are at `crossovers` [Hz] on `rails` (seeds, the stage's own first). `started` are
-    the outcomes of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
-    `plotted` are the indices of the thesis's crossovers. `rail` is the index of the rail of the logs and of the
-    `traces`, by case and index of the crossover. It is the first one with counted peaks, locked, at the stage's own
-    crossover, or else the stage's own. `startable` is a machine that comes to rest after the move but hunts after a
-    release, None if there is none.
+    shape (crossovers, rails). The moves are made at `crossovers` [Hz] on `rails` (seeds, the stage's own first).
+    `started` are the outcomes of releases with the joint locked, shape (displacements, crossovers, rails), by
+    `displacements` [m].
+
+    `plotted` are the indices of the thesis's crossovers. Logs and `traces`, by case and index of the crossover, are
+    those of one rail, with the index `rail`. It is the first rail with counted peaks at the stage's own crossover,
+    joint locked; if there is none, it is the stage's own rail. `startable` is a machine that comes to rest after the
+    move but hunts after a release, None if there is none.
     """
 
     distance: float
@@ -162,8 +164,8 @@ def _moves_and_releases(
 ) -> tuple[dict[str, RailRuns], RailRuns]:
     """Run the move in each case (locked, free), and releases with the joint locked.
 
-    `frequencies` are crossovers [Hz], and `seeds` those of the rails. Moves have the shape (crossovers, rails),
-    releases (displacements, crossovers, rails).
+    `stages` are those of the cases, and `there` is the move. `frequencies` are crossovers [Hz], and `seeds` those of
+    the rails. Moves have the shape (crossovers, rails), releases (displacements, crossovers, rails).
     """
     stage, shape = stages["locked"], (len(frequencies), len(seeds))
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
@@ -186,7 +188,8 @@ def _startable(
 ) -> Startable | None:
     """Return a machine that hunts after a release but not after the move, or None.
 
-    Of all such machines it has the lowest crossover, on a rail without counted peaks after the move.
+    `moved` are the outcomes of the moves and `started` those of the releases, at crossovers `frequencies` [Hz] on rails
+    with `seeds`. Of all such machines it has the lowest crossover, on a rail without counted peaks after the move.
     """
     lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))

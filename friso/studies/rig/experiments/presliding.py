@@ -98,7 +98,7 @@ def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
     """Return the log of loops at a place [m], made by a sinusoidal force.
 
-    Its amplitude is a fraction `share` of static friction.
+    The amplitude of the force is a fraction `share` of static friction.
     """
     step = as_built_keys(stage)["drive.sample_time"]
     samples = round(PERIOD / pace(stage) / step)

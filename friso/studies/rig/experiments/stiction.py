@@ -43,8 +43,8 @@ SPEEDS = (1, 2, -1, -2)
 class Stiction:
     """Results of the stiction experiment.
 
-    Each log is evaluated with the joint's true stiffness. For each rail, `true` has the least and greatest true static
-    friction [N] where the cart went, shape (rails, 2). `speed` [m/s] is the slow one.
+    The logs are evaluated with the joint's true stiffness. For each rail, `true` has the least and greatest true static
+    friction [N] where the cart went, shape (rails, 2). `speed` [m/s] is that of the slow motion.
     """
 
     by_rail: tuple[StickSlip, ...]
@@ -94,7 +94,7 @@ def slow_speed(stage: Stage) -> float:
 def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
     """Return logs of slow motion to and fro, on `rails` rails of successive seeds.
 
-    All start from the same place.
+    All motions start from the same place.
     """
     free, period, slow = freed(stage), 1 / pace(stage), slow_speed(stage)
     parts = [(0.0, STANDS * period / 4)]
@@ -111,9 +111,9 @@ def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]
 
 
 def _log(free: Stage, chunk: RecordedRuns, row: int, number: int, seed: int) -> RigLog:
-    """Return one rail's log, with the stage that has this rail.
+    """Return the log of one rail, with the stage that has this rail.
 
-    It is in `row` of a chunk of runs, and `number` is the rail's index.
+    The run is the one in `row` of a chunk of runs, and `number` is the rail's index.
     """
     on_rail = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
     return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", on_rail, seed + number)
