@@ -126,7 +126,7 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return the initial states of stages at rest, their masses displaced as the motion says.
+    """Return the initial states of stages at rest, (runs, states), displaced as the motion says.
 
     Filters have settled, and the actuator carries the constant forces.
     """

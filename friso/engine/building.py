@@ -106,7 +106,10 @@ class _Work:
             return job
 
     def _leave(self, jobs: list[_Job], overtaken: bool) -> list[_Job]:
-        """Stop waiting for jobs; return the abandoned ones, for which nobody else waits."""
+        """Stop waiting for jobs; abandon and return those for which nobody else waits.
+
+        If the wait was `overtaken`, jobs that are being compiled go on.
+        """
         with self._turn:
             for job in jobs:
                 job.waiting -= 1
@@ -190,7 +193,7 @@ class _Job:
 
     @contextmanager
     def _held(self, lock: FileLock) -> Iterator[None]:
-        """Hold the lock of the request, waiting until no other process holds it."""
+        """Hold the lock of the request in the `with` block, once no other process holds it."""
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -202,7 +205,7 @@ class _Job:
 
     @contextmanager
     def _core(self) -> Iterator[None]:
-        """Occupy a core while building."""
+        """Occupy a core in the `with` block, while building."""
         while not self._cores.acquire(timeout=_PATIENCE):
             self._go_on()
         try:

@@ -436,7 +436,10 @@ def stands(B, layout, lane):
 
 
 def look_inside(B, layout, lane, fraction, batch, settings, results):
-    """Record when the run in a lane entered a band, or turned, in its last step."""
+    """Record when the run in a lane entered a band, or turned, in its last step.
+
+    Only the `fraction` of the step that was accepted counts.
+    """
     start, end = deviation(B, layout, lane, 0.0), deviation(B, layout, lane, fraction)
     note_entry(B, layout, lane, ROW.inner_exit, fraction, start, end, settings.inner)
     note_entry(B, layout, lane, ROW.outer_exit, fraction, start, end, settings.outer)

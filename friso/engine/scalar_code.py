@@ -159,7 +159,10 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
-        """Write a function as LLVM code, for arguments of the given types."""
+        """Write a function as LLVM code, for arguments of the given types.
+
+        Returns the LLVM function, and the type of its result (None: it returns nothing).
+        """
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))

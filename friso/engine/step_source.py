@@ -277,7 +277,10 @@ class StepWriter:
         return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
 
     def _in_buffer(self) -> Rename:
-        """Return the names in the code for what a sample depends on, most of it in the buffer."""
+        """Return a function that gives the name in the code of a symbol on which a sample depends.
+
+        Most of these names are places in the buffer.
+        """
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}

@@ -163,7 +163,7 @@ class Blocks(ABC):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Mark the blocks made within as parts of the "position" or the "velocity" loop.
+        """Mark blocks that are made in this context as parts of the "position" or "velocity" loop.
 
         A drive may run the position loop at a lower rate.
         """
@@ -236,7 +236,7 @@ class Blocks(ABC):
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains for standstill while the error is small.
+        """Return the force, with the gains for standstill while the error is within their window.
 
         `total` is the force with the usual gains. The integrals keep the force that they had.
         """
@@ -347,11 +347,11 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the states of integrators in a steady motion in which the controller gives a force.
+    """Return the states of integrators in a steady motion with some force of the controller.
 
-    That force is `force` of `STEADY`. The innermost integral, the last of `integrals`, supplies it; the others are 0.
-    The argument `force` is the controller's own force in the steady motion, in terms of the integrals. The result is
-    empty without integrals.
+    That force is the symbol `STEADY.force`; the innermost integral, the last of `integrals`, supplies what is missing,
+    and the others are 0. The argument `force` is what the controller computes in the steady motion, in terms of the
+    integrals. The result is empty without integrals.
     """
     if not integrals:
         return {}

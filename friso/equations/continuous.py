@@ -139,7 +139,7 @@ class Continuous(Blocks):
 
     @property
     def integrands(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return the inputs of the integrators in a steady motion."""
+        """Return the inputs of the integrators in a steady motion, by the symbols of their states."""
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
@@ -278,9 +278,9 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """Return a mode with memory for the sign of the error, where integrals restart at a change.
+        """Return a mode with memory for the sign of the error, at whose change integrals restart.
 
-        They restart at 0. There is no mode if no integral restarts.
+        They restart at 0. The result is empty if no integral restarts.
         """
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
@@ -351,10 +351,10 @@ def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return how far a limit stops an integrator: 0 if it runs, 1 if it is stopped.
+    """Return how far a limit stops an integrator: from 0 if it runs to 1 if it is stopped.
 
-    The limit stops it where the value is beyond one of the `limits` and would be driven further. Beyond `far` it has
-    stopped altogether. `winding` tells in which direction it is driven.
+    The limit stops it where the value is beyond one of the `limits` and would be driven further, gradually until it is
+    beyond `far`. `winding` tells in which direction it is driven.
     """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):

@@ -47,8 +47,9 @@ class Model:
 
     - `deviation` [m]: position minus reference.
     - `length` [m] and `rate` [1/s]: scales of the motion, from which the solver takes its absolute tolerances.
-    - `breakaway` [N]: largest friction force at rest; `steady` [N]: friction in a steady motion, None where the law
-      lacks it.
+    - `breakaway` [N]: largest force of the controller at which nothing moves: friction at rest, and with a backlash the
+      force at half of it.
+    - `steady` [N]: friction in a steady motion, None where the law lacks it.
     - `stiffness` [N/m]: proportional stiffness of the loop.
     - `jumps`: for each kink, the jumps of states where it is crossed, as expressions of the values just before.
     - `inputs`: values that are new at every corner of the reference, in this order; `reference`: what its pieces
@@ -298,8 +299,8 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
 
     The length is the deflection of the loop by the break-away force, or about the motion itself if that is shorter. The
     rate is the natural frequency of mass and loop, but at least one over the duration of the motion. A hunting cycle is
-    a few of each in size and period. Without friction the length is that of the motion, or else the deflection by the
-    forces of [bias].
+    a few lengths wide and takes a few times 1/rate. Without friction the length is that of the motion, or else the
+    deflection by the forces of [bias].
     """
     stiffness = loop_stiffness(structure.controller)
     if breakaway == 0:

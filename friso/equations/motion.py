@@ -25,7 +25,7 @@ def varies(flat: Mapping[str, Any]) -> bool:
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Return the pieces of the reference of each run, shape (runs, pieces, 1 + inputs).
 
-    See `friso.equations.reference`.
+    A piece is a row of its start [s] and of the inputs of the equations (see `friso.equations.reference`).
     """
     kind = motion_of(flat)
     form, rows, tones = kind.form(flat), kind.pieces(flat), kind.tones(flat)
@@ -161,8 +161,9 @@ def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a stage whose reference stands still from the start.
 
-    It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
-    to its end. A motion whose reference has a single piece is returned unchanged, even if that piece moves.
+    It stands where the reference of the stage's own motion ends. The new motion is a step to that place. If the place
+    is 0, it is a release over the length of the old motion, which sets the scales of the equations. A motion whose
+    reference has a single piece is returned unchanged, even if that piece moves.
     """
     rows = motion_of(flat).pieces(flat)
     if len(rows) == 1:

@@ -43,7 +43,7 @@ def counter(loop: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class Rest:
-    """Conditions under which integrators pause (`rests`) or restart at a sample.
+    """Conditions at a sample under which integrators pause (`rests`) or restart (`restarts`).
 
     The force limit is not among them.
     """
@@ -73,10 +73,11 @@ def sampled_controller(
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator of a drive: its number, its next value, and its increment per sample.
+    """An integrator of a drive: the symbols of its number and of the number's next value.
 
-    The increment is `share`. There is a gain, a limit of the output, a leak, and the period of its loop. `due` is the
-    condition for the loop to run (None: at every sample).
+    `share` is the increment of the number per sample; the output is the number times `gain`, at most `limit`. `leak`
+    [1/s] is its leak, and `period` [s] that of its loop. `due` is the condition for the loop to run (None: at every
+    sample).
     """
 
     symbol: sp.Symbol
@@ -142,7 +143,10 @@ class Sampled(Blocks):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Mark blocks as parts of a loop; their numbers change only at samples at which it runs."""
+        """Mark blocks made in this context as parts of the loop `name`.
+
+        Their numbers change only at samples at which that loop runs.
+        """
         if self.form is None or name not in self.form.loops:
             yield
             return

@@ -154,7 +154,7 @@ class _Side:
     def _finer(self, first: int) -> np.ndarray:
         """Return factors to try between the factor numbered `first` and the one before.
 
-        At the first of both hunting has changed, at the other not.
+        Hunting has changed at the factor `first`, and has not at the one before.
         """
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]

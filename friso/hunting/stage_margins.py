@@ -53,7 +53,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
 
 
 def _is_known(judgement: Judgement) -> bool:
-    """Tell whether a stage may hunt, and it is certain whether something attracts it."""
+    """Tell whether a judged stage may hunt, and it is certain whether something attracts it."""
     hunting, unclear = judgement.hunting, judgement.observed and judgement.hunting.target is None
     failed = judgement.verdict == "failed" or judgement.runs_away or hunting.passing
     return hunting.possible and hunting.certain and not failed and not unclear

@@ -102,9 +102,10 @@ class PidGains(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try: names to the keys that change [SI].
+        """Return other structures to try, by name: a mapping of the keys that change to values [SI].
 
-        They take the derivative of the other signal, add feedforward, or drop or add the integral.
+        A structure takes the derivative of the other signal, adds feedforward, or drops or adds the integral. None as a
+        value removes the key.
         """
         listed: dict[str, Mapping[str, Any]] = {}
         if flat[KD] and flat[DERIVATIVE_ON] == "error":

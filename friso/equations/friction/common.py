@@ -39,9 +39,9 @@ class Friction:
     """A friction law's equations: the force [N] against the velocity, its states and its scales.
 
     `component` has states, outputs, and kinks (where derivatives jump). `breakaway` [N] is the largest force at rest,
-    from which the solver takes its length scale. `sliding` is for a steady motion at the velocity. It gives the law's
-    own states, its modes with memory, and the sides of its kinks other than the direction. Without `sliding`, they are
-    the values at which the states do not change. At rest all modes with memory have been left.
+    from which the solver takes its length scale. `sliding` maps symbols to their values in a steady motion at the
+    velocity: the law's own states, its modes with memory, and the sides of its kinks other than the direction. Without
+    `sliding`, these are the values at which the states do not change. At rest all modes with memory have been left.
     """
 
     def __init__(

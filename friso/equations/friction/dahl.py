@@ -35,7 +35,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Tell whether [conditions] multiply the level."""
+        """Tell whether [conditions] multiply the law's level of sliding friction."""
         return has_conditions(flat)
 
     @staticmethod
@@ -76,7 +76,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction; nothing of its shape is free."""
+        """Return the law's keys for measured friction; `shape` is ignored, as no key shapes the law."""
         return Dahl.keeping(measured, 1)
 
 

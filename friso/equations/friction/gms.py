@@ -60,7 +60,7 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """Return the rule that the list `key` has one value for each element stiffness, or none.
+    """Return the rule that the list `key` has one value for each element stiffness, or is empty.
 
     In the error message, `what` names a value of the list, and `two` is an example for two elements.
     """

@@ -26,7 +26,10 @@ def close_orbits(
     parts = []
 
     def close_from(group: np.ndarray, starts: np.ndarray, times: np.ndarray, n: int) -> Cycles:
-        """Close orbits of `n` swings for the runs with the numbers `group`."""
+        """Close orbits of `n` swings for the runs with the numbers `group`.
+
+        `starts`, shape (group, states), are states near the orbits, and `times` [s] the approximate times of return.
+        """
         sign = -1.0 if n % 2 else 1.0
         stages = runs.stages.take(group)
         if sign < 0:
@@ -76,10 +79,11 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """Return a state of each run, (runs, states), in which it sticks within `times` [s].
+    """Return a state in which each run sticks, (runs, states), within twice the `times` [s].
 
     At this instant the integrator balances the constant forces on a stage at rest. If there are several such instants,
-    the one after the longest standstill is taken. `times` has the shape (runs,).
+    the one after the longest standstill is taken; if there is none, the state at the start. `pending` are the runs, and
+    `times` has the shape (runs,).
     """
     settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)

@@ -192,16 +192,17 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk ended at the farthest place on the line of keys.
+        """Tell whether a walk along a branch ended at the farthest place on the line of keys.
 
-        False if it ended at the first place, or for another reason.
+        `points` and `reason` are what the walk returned. The result is false if it ended at the first place, or for
+        another reason.
         """
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """Return the cycle at the end of the range as a list of one; an empty list if none is found.
+        """Return the cycle at the end of the range of places, as a list of one; empty if it fails.
 
-        It lies between the last point inside the range and the first beyond.
+        `last` is the last point inside the range, and `beyond` the first point outside.
         """
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)
@@ -211,15 +212,16 @@ class Tracer:
     def _is_mirrored(self, start: Point, point: Point) -> bool:
         """Tell whether the middle of an asymmetric cycle has passed to the reference's other side.
 
-        Beyond the symmetric cycle a branch of asymmetric cycles continues as its own mirror image. The result is false
-        for stages without mirror-image motions.
+        The cycles are those at `point` and at the `start` of the branch. Beyond the symmetric cycle a branch of
+        asymmetric cycles continues as its own mirror image. The result is false for stages without mirror-image
+        motions.
         """
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         leans = float(point.cycle.middle[0] * start.cycle.middle[0])
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
     def _stop(self, point: Point) -> str:
-        """Return the reason why a branch is not followed beyond a point; "" if it is."""
+        """Return the reason why a branch is not followed beyond a point; "" if it is followed on."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
@@ -228,7 +230,7 @@ class Tracer:
         return ""
 
     def branch(self, start: Point) -> Branch:
-        """Follow the whole branch through a point, in both directions."""
+        """Follow the branch through the cycle `start`, in both directions."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 

@@ -82,5 +82,8 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
-    """Return the standard deviation of values, (n,), about a cubic fitted to them."""
+    """Return the standard deviation of values, (n,), about a cubic `curve` through them.
+
+    `at`, shape (n,), are the places of the values.
+    """
     return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

@@ -127,9 +127,11 @@ CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
-    """Return the hunting cycles of stages, and the searches for curves on which they change.
+    """Return the hunting cycles of stages, and between which stages to search for curves.
 
-    A stage for which no cycle could be closed is neither inside nor outside of a curve.
+    A search names stages inside and outside of a curve. In the first, the cycle attracts inside and not outside. If
+    there is a second, an attracting cycle lies between asymmetric ones inside, and has none beside it outside. A stage
+    that may have a cycle which was not closed is on neither side.
     """
     hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain

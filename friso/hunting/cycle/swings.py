@@ -57,7 +57,8 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
     """Find the turning points of zigzags whose legs are at least `least` [m] long, (runs,).
 
-    `values` [m] and `times` [s] have the shape (runs, points). `side` is 1 or -1 for runs that start on that side.
+    At most `most` are returned for each run, after the first. `values` [m] and `times` [s] have the shape (runs,
+    points). `side` is 1 or -1 for runs that start on that side.
     """
     runs = len(values)
     rows = np.arange(runs)
