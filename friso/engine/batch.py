@@ -169,9 +169,10 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run the numbered runs, with `room` for turning points.
+    """Run the numbered runs from their `starts`, with `room` for turning points.
 
-    Runs with too many turning points are repeated, fewer at a time, with more room for each.
+    Runs with too many turning points are repeated, fewer at a time, with more room for each. Without `starts`, runs
+    begin as their motions say.
     """
     part = part_of(flat, numbers)
     least = options.least_swing

@@ -84,9 +84,11 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 
 
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
-    """Estimate the processor clocks of a factorisation and `solves` solutions.
+    """Estimate the processor clocks of one factorisation and `solves` solutions.
 
-    The estimate is the longest chain of operations that wait for each other, plus some time for every operation.
+    Pivots are taken in this `order`. The matrix is not zero at `nonzero`; rows not in `diagonal` have a common number
+    on the diagonal. The estimate is the longest chain of operations that wait for each other, plus some time for every
+    operation.
     """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0

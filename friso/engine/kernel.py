@@ -68,7 +68,10 @@ class Kernel:
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
     def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
-        """Compute this thread's share of a batch of runs, and write the results."""
+        """Compute this thread's share of a batch: the runs whose numbers it takes from the queue.
+
+        The results are written into `results`.
+        """
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:

@@ -179,12 +179,12 @@ class _Writer:
         return _Vector(self.builder.fcmp_ordered(sign, *values, flags=FASTMATH), _TRUTH)
 
     def select(self, condition: Any, chosen: Any, otherwise: Any) -> _Vector:
-        """Return one of two computed values, chosen without a branch."""
+        """Return `chosen` where the condition is true, else `otherwise`, in each lane; no branch."""
         values, kind = self.together(chosen, otherwise)
         return _Vector(self.builder.select(self.truth(condition).value, *values), kind)
 
     def truth(self, value: Any) -> _Vector:
-        """Return whether a number is not 0, as in Python."""
+        """Return in each lane whether a number is not 0, as in Python."""
         if isinstance(value, _Vector) and value.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
             return _Vector(self.builder.fcmp_unordered("!=", value.value, zero, flags=FASTMATH), _TRUTH)
@@ -203,7 +203,7 @@ class _Writer:
         return self._library("sqrt", value)
 
     def _library(self, name: str, value: Any) -> _Vector:
-        """Return the result of one of LLVM's own functions of a number."""
+        """Return the result of LLVM's own function `name` of a number, in each lane."""
         vector = self._type(_FLOAT)
         signature = ir.FunctionType(vector, [vector])
         called = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.lanes}f64", (), signature)

@@ -136,7 +136,7 @@ def _shaken(part: Any) -> sp.Expr:
 
 
 def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
-    """Return the force of the cables on the stage [N]."""
+    """Return the force of the cables on the stage [N], from its position and velocity."""
     from friso.equations.component import key
 
     return -key("cable.stiffness") * position - key("cable.drag") * velocity
@@ -177,7 +177,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
     """Return the encoder's reading [m], the commanded force [N], and numbers the drive keeps.
 
-    These numbers are kept from one sample to the next.
+    `loop` has what is measured at the sample. The numbers are kept from one sample to the next.
     """
     from dataclasses import replace
 

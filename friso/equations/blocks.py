@@ -129,7 +129,7 @@ class Measured:
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
-    """Make signals of a controller's inputs, scaled by a length [m] and a rate [1/s]."""
+    """Make signals of a controller's inputs, `loop`, scaled by a length [m] and a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
@@ -257,7 +257,7 @@ class Blocks(ABC):
         return self._filtered(signal, FEEDBACK)
 
     def fed_forward(self, signal: Signal) -> Signal:
-        """Return a demanded force behind the filters of the forward path."""
+        """Return a demanded force, `signal`, behind the filters of the forward path."""
         return self._filtered(signal, FORWARD)
 
     def _filtered(self, signal: Signal, path: str) -> Signal:
@@ -316,7 +316,7 @@ class Demand:
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
-    """Return the force that a controller demands for its measured inputs."""
+    """Return the force that a controller demands for the measured inputs `seen`."""
     error, settings = seen.error, form.settings
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)

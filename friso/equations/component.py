@@ -105,7 +105,7 @@ class sine(sp.Function):
     nargs = 1
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative, 2 pi cos(2 pi x)."""
+        """Return the derivative by the number of turns x: 2 pi cos(2 pi x)."""
         return 2 * sp.pi * sine(self.args[0] + sp.Rational(1, 4))
 
 

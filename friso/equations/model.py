@@ -253,7 +253,7 @@ def _bodies(structure: Structure) -> Bodies:
 def _positions(structure: Structure, chain: Bodies) -> list[Component]:
     """Return position and velocity of the stage as outputs.
 
-    With a transmission, the outputs of the measured side come first.
+    With a transmission, the outputs of the side whose position is measured come first, then those of the other side.
     """
     if not (structure.transmission and chain.motor):
         return [position_outputs("", "stage", chain.stage)]
@@ -264,7 +264,7 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
-    """Return the friction law at the motor in terms of the motor's velocity, if there is one."""
+    """Return the friction law at the motor, by the motor's velocity; None without such friction."""
     form = structure.transmission
     if form is None or chain.motor is None:
         return None
@@ -322,7 +322,8 @@ def _mechanics(
 ) -> tuple[list[State], list[Component]]:
     """Return the states of every body by Newton's law, and the parts that supply the forces.
 
-    `frictions` act on the cart and at the motor. `scales` are the length [m] and the rate [1/s] of the states.
+    `frictions` act on the cart and at the motor; `forces` are those of the actuator and of external causes. `scales`
+    are the length [m] and the rate [1/s] of the states.
     """
     cart, stage, parasitic, motor = chain.cart, chain.stage, chain.parasitic, chain.motor
     friction, motor_friction = frictions

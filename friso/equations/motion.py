@@ -39,7 +39,8 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
 def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
     """Return pieces of the reference with sinusoids added, cut also where it reverses.
 
-    `rows` has the shape (runs, pieces, 1 + inputs), and `duration` [s] is that of the runs.
+    `rows` are the pieces without sinusoids, shape (runs, pieces, 1 + inputs); `tones` are the sinusoids, and `duration`
+    [s] is that of the runs.
     """
     ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
     for number, tone in enumerate(tones):
@@ -53,7 +54,8 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     """Return the pieces of one run's reference with sinusoids, cut also where it reverses.
 
-    `rows` are pieces up to the time `end` [s], whose sinusoids have their phases at time 0.
+    `rows`, shape (pieces, 1 + inputs), are pieces up to the time `end` [s], whose sinusoids have their phases at time
+    0. The result has as many columns.
     """
     starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
@@ -62,7 +64,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     bare[:, first:] = 0.0
 
     def rate(time: np.ndarray) -> np.ndarray:
-        """Return the velocity of the reference at times of the run [m/s]."""
+        """Return the velocity of the reference [m/s] at times of the run [s], both of shape (n,)."""
         piece = bare[np.searchsorted(starts, time, side="right") - 1]
         of_tones = np.concatenate([np.zeros((1, first)), rows[:1, first:]], axis=1)
         return value(form, piece, time - piece[:, 0], 1) + value(form, of_tones, time, 1)
@@ -86,7 +88,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
 
 
 def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return the reference position [m] of one run at the times [s]."""
+    """Return the reference position [m] of one run at times [s], both of shape (n,)."""
     rows = pieces(flat, 1)[0]
     row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
     return value(form_of(flat), row, time - row[:, 0])

@@ -119,7 +119,10 @@ class DiscreteRate:
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:
-        """Return the ratio of the substitute to s at low frequencies; 1 unless it is prewarped."""
+        """Return the ratio of the substitute to s at low frequencies; 1 unless it is prewarped.
+
+        `period` [s] is the sample time.
+        """
         return 2 * period / (self.step * (1 + self.weight))
 
     def polynomial(self, polynomial: Polynomial) -> Polynomial:
@@ -296,7 +299,7 @@ class Sampled(Blocks):
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference, by the error at a sample.
 
-        It acts while the reference rests.
+        It acts while the reference rests, that is while its `direction` is 0.
         """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
@@ -334,6 +337,7 @@ class Sampled(Blocks):
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """Return the force before its limit, and all held numbers.
 
+        `demand` is what the controller asks for, and `rest` has conditions under which integrators pause or restart.
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.
         """

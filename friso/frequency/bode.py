@@ -198,7 +198,10 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
 
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
-    """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage."""
+    """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage.
+
+    The crossovers are those of `all_margins`.
+    """
     settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)

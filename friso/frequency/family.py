@@ -173,7 +173,7 @@ def distance_to_lines(loop: Complex) -> np.ndarray:
 
 
 def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
-    """Return angular frequencies [rad/s] that resolve the loops in all limit cases.
+    """Return angular frequencies [rad/s] that resolve the loops in all limit cases, (k,).
 
     There are `density` per decade, and more about the resonances of plant and closed loop.
     """

@@ -1,4 +1,4 @@
-"""The table [conditions]: under which the machine runs that [friction] was measured of."""
+"""The table [conditions]: how the guide runs, against when its [friction] was measured."""
 
 from __future__ import annotations
 

@@ -392,9 +392,10 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def _of_another_form(error: StageError, changes: Mapping[str, Any], others: Sequence[str]) -> StageError:
-    """Return the error for changes to a form of controller of which the tables lack some keys.
+    """Return a clearer error for keys of another form of controller than the stage file's.
 
-    `others` are the keys of the form in the tables. Other errors are returned unchanged.
+    A form is one way to give a controller, such as by rules or by gains. `error` says that keys of the other form are
+    missing; `others` are the keys in the file. An error about anything else is returned unchanged.
     """
     if not error.actual.startswith("nothing"):
         return error

@@ -107,7 +107,7 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
     """Return the task of moving from place to place [m], with a stand [s] after each move.
 
-    Acceleration [m/s^2] and speed [m/s] are bounded.
+    Moves accelerate and brake at `acceleration` [m/s^2], and are no faster than `top_speed` [m/s].
     """
     rows, now = [[0.0, places[0], 0.0, 0.0]], stands
     for start, end in pairwise(places):

@@ -91,6 +91,6 @@ def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
 
 
 def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """Return the roots listed under a key; the conjugates of complex roots are added."""
+    """Return the complex roots listed under a key, (n,); conjugates of complex ones are added."""
     roots = [complex(flat[name]) for name in element_keys(flat, key)]
     return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])

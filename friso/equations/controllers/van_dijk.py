@@ -142,7 +142,10 @@ def controller_table(crossover: str) -> dict[str, Any]:
 
 
 def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
-    """Return the keys of a controller by van Dijk's rules, for a crossover [Hz] and a mass [kg]."""
+    """Return the keys of a controller by van Dijk's rules, for a crossover [Hz] and a mass [kg].
+
+    `alpha` and `beta` are the rules' other numbers.
+    """
     return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}
 
 

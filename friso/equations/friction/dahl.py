@@ -67,7 +67,10 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost."""
+        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost.
+
+        `elements` has no effect on a law with one spring.
+        """
         return {
             "friction.coulomb": measured.levels.coulomb,
             "friction.viscous": measured.levels.viscous,

@@ -130,8 +130,8 @@ def _middles(z: np.ndarray) -> np.ndarray:
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
     """Compute the friction force on a periodic motion from velocities [m/s], shape (M,).
 
-    They are those at the middles of M intervals, each an `interval` [s] long. After these the motion is back at its
-    start (`sign` 1), or at the mirror image (-1).
+    Velocities are taken at the middles of M intervals, each an `interval` [s] long. After these the motion is back at
+    its start (`sign` 1), or at the mirror image (-1).
     """
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)
