@@ -82,7 +82,7 @@ def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
 
 
 def print_wrapped(sentence: str, indent: str = "") -> None:
-    """Print a sentence in lines as wide as the terminal."""
+    """Print a sentence in lines as wide as the terminal, each after the `indent`."""
     width = shutil.get_terminal_size().columns
     lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
     print(textwrap.indent("\n".join(lines), indent))

@@ -34,7 +34,7 @@ Other = tuple[float, str]
 class Conversion:
     """One gain of a controller: its name, its symbol, and its value in several units.
 
-    The first of the values is in SI. Each value stands beside its unit.
+    Values stand beside their units; the first one is in SI.
     """
 
     name: str

@@ -242,7 +242,7 @@ class _Job:
 class _Surroundings:
     """Conditions under which a builder was started: process, cache, module folders, plug-ins.
 
-    Another builder is needed if they change.
+    Another builder is needed if one of them changes. The process is the one that started it.
     """
 
     process: int

@@ -22,9 +22,9 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 class Inputs:
     """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
 
-    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Both are sampled
-    every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and linear between
-    samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Reference and force
+    are sampled every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and
+    linear between samples. The force is linear too, or constant if `held`, as in a sampled drive.
     """
 
     reference: np.ndarray

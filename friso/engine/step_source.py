@@ -269,7 +269,7 @@ class StepWriter:
     def _piece_of_sample(self) -> list[str]:
         """Write the code that finds the piece of the reference in which the sample was taken.
 
-        It is the previous piece if a corner came in between.
+        The piece is the previous one if a corner came in between.
         """
         length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
         lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
@@ -397,8 +397,8 @@ class StepWriter:
     def _crossings(self) -> list[str]:
         """Write the search for the first crossing of a kink (where derivatives jump) in the step.
 
-        It is at the fraction `fraction` of the step, 1 if there is none. `astray` is true if a run is on the other side
-        of a kink than its mode says.
+        The code sets `fraction` to the fraction of the step at which it lies, or 1 if there is none. It sets `astray`
+        to true if a run is on the other side of a kink than its mode says.
         """
         lines = []
         for point, theta in enumerate(THIRDS):

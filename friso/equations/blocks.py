@@ -245,7 +245,7 @@ class Blocks(ABC):
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return a constant force towards the reference, which acts while the reference rests.
 
-        It acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
+        The force acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
         """
 
     @abstractmethod

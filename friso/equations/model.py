@@ -285,7 +285,7 @@ def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
 def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
     """Return friction [N] at guide and motor while all masses move with the cart.
 
-    It is None if a law does not determine it.
+    Returns None if a law does not determine it.
     """
     total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
     if motor_friction and chain.motor and total is not None:

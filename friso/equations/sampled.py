@@ -249,8 +249,8 @@ class Sampled(Blocks):
     ) -> Signal:
         """Return a signal behind a second-order transfer function, computed at every sample.
 
-        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator. They are discretised by
-        `rule`, or by the drive's own rule if it is None.
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator. The function is
+        discretised by `rule`, or by the drive's own rule if it is None.
         """
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
         (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))

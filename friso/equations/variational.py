@@ -107,8 +107,8 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
     """Tell whether a difference is zero everywhere on a kink's surface, where derivatives jump.
 
-    It is tested at some points. The result is false if the surface is linear in no symbol, as at the end of a window.
-    It is also false if the surface has no slope at one of the points.
+    `gap` is the difference, an expression, tested at some points. The result is false if the surface is linear in no
+    symbol, as at the end of a window. It is also false if the surface has no slope at one of the points.
     """
     if gap == 0:
         return True

@@ -118,7 +118,7 @@ class Bode:
     def settled(self) -> tuple[Members, Margins]:
         """Return the worst of the states in which a stage may settle, with its margins.
 
-        They are the limit cases, and the states stuck under any bias force.
+        A stage may settle in the limit cases, and in the states stuck under any bias force.
         """
         return self._with_margins(self.scan.worst(self.scan.members.settled))
 

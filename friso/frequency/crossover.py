@@ -100,8 +100,8 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     """Return the range of crossovers [Hz] that is searched.
 
-    It ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a range of
-    factors of its bandwidth.
+    The range ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a
+    range of factors of its bandwidth.
     """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
@@ -154,9 +154,10 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search over crossovers of a stage's controller, in all states in which it may settle.
+    """Search over crossovers of a stage's controller, in all states in which it may settle.
 
-    `members` are these states. Parts that do not depend on the crossover are computed once.
+    `flat` has the stage's keys in SI, and `members` are these states. Parts that do not depend on the crossover are
+    computed once.
     """
 
     flat: Mapping[str, Any]

@@ -119,7 +119,7 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
     """Return the loop at frequency 0 in a list, which is empty if it is not finite there.
 
-    It is finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
+    The loop counts as finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
     """
     settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)

@@ -233,7 +233,7 @@ class _Grid:
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
         """Follow attraction from the bandwidth factor numbered `at` to its end.
 
-        It is followed up (`ahead` 1) or down (-1). Returns None if attraction reaches the end of the search, or if
+        Attraction is followed up (`ahead` 1) or down (-1). Returns None if it reaches the end of the search, or if
         closer inspection shows no attractor. Raises Exhausted if an allowance of work is used up.
         """
         if not self.proved(at, ahead):

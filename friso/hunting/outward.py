@@ -55,9 +55,9 @@ class AttractionEnd:
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """A window of bandwidths in which a stage hunts, by its two ends.
+    """A window of bandwidths in which a stage hunts, by its ends `low` and `high`.
 
-    The ends are factors of the stage's own bandwidth; None at the end of the search.
+    The ends are in factors of the stage's own bandwidth (None: the window reaches the end of the search).
     """
 
     low: AttractionEnd | None

@@ -37,9 +37,9 @@ TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 
 @dataclass(frozen=True)
 class Choices:
-    """A list below the help of a command: names, each with one line on it.
+    """A list below the help of a command: a title, and names, each with one line on it.
 
-    The list is read only when the help is shown.
+    `rows` is called, to read the list, only when the help is shown.
     """
 
     title: str

@@ -20,7 +20,10 @@ EXPECTED = f"a path with names of at most {LONGEST_NAME} bytes, and of at most {
 
 
 def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> str:
-    """Return why a path cannot name a file or a folder; "" if it can."""
+    """Return why a path cannot name a file or a folder; "" if it can.
+
+    Names in the path may have at most `longest_name` bytes.
+    """
     text = os.fspath(path)
     if not text:
         return "an empty path"

@@ -347,7 +347,7 @@ if sys.platform == "linux":
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
         """Return the quota of processor time of this process's control groups, in cores.
 
-        Both versions of control groups count. The quota is infinite without a limit.
+        Groups of version 1 and version 2 count. The quota is infinite without a limit.
         """
         try:
             lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]

@@ -59,9 +59,9 @@ class Correlations:
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
     def over(self, keys: list[str]) -> np.ndarray:
-        """Return the correlation matrix of all `keys`, shape (keys, keys).
+        """Return the correlation matrix of `keys`, shape (keys, keys), in their order.
 
-        They must include the keys of this object; the others are independent.
+        The keys must include those of this object; all others are independent.
         """
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]

@@ -489,7 +489,7 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
 def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
     """Yield each rule between keys, and where the stage's keys in SI break it.
 
-    The second is a boolean, or an array if keys have arrays.
+    "Where" is a boolean, or an array of booleans if keys have arrays.
     """
     for name, owner in (("", Stage), *_tables(flat).items()):
         at_motor = name == MOTOR_FRICTION

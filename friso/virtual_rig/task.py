@@ -96,7 +96,7 @@ def staircase(steps: Sequence[float], stands: float) -> MoveTask:
 def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
     """Return the task of moving at constant velocities [m/s] in turn, each for a time [s].
 
-    The reference begins at `start` [m]; a velocity of 0 is a standstill.
+    `parts` are pairs of velocity and time. The reference begins at `start` [m]; a velocity of 0 is a standstill.
     """
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])

@@ -109,7 +109,7 @@ def recognises(name: str, text: str) -> bool:
 
 
 def whole(text: str, beside: Beside) -> str:
-    """Replace each #INCLUDE line by the text of the file that it names.
+    """Replace each #INCLUDE line by the text of the file that it names, as read by `beside`.
 
     Only files in the folder of the INI file are taken in. Included files cannot include others.
     """

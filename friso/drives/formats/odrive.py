@@ -282,7 +282,10 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
-    """Return the number of a mode, which the file may also give by name."""
+    """Return the number of a mode `name`, which the file may also give by a symbol.
+
+    An absent mode has the number `default`.
+    """
     return axis.number(f"{CONFIG}.{name}", default, SYMBOLS[name])
 
 

@@ -39,7 +39,10 @@ SLOWER = 4.0
 
 
 class CascadeTerms(NamedTuple):
-    """Which terms a cascade has; terms that it lacks are left out of the equations."""
+    """Which terms a cascade has; terms that it lacks are left out of the equations.
+
+    They are the integrals of both loops, the filter of the velocity, and `feedforward`, by the names of its keys.
+    """
 
     position_integral: bool
     velocity_integral: bool

@@ -28,7 +28,10 @@ SLOWER = 4.0
 
 
 class Terms(NamedTuple):
-    """Which terms a PID controller has; terms that it lacks are left out of the equations."""
+    """Which terms a PID controller has; terms that it lacks are left out of the equations.
+
+    They are the integral, the derivative and its filter, and `feedforward`, by the names of its keys.
+    """
 
     integral: bool
     filtered: bool
@@ -127,7 +130,7 @@ class PidGains(Pid):
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """Return the controller's gains and times, and those of an equivalent P over PI loop.
 
-        The latter are left out if there is no such loop.
+        The gains of the P over PI loop are left out if there is no such loop.
         """
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]

@@ -181,10 +181,10 @@ class RationalController(ControllerSection):
 
 
 def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the timing keys that follow from the controller's own sample time.
+    """Return the timing keys that follow from the controller's own sample time [s].
 
-    They set the drive's sample time if the file has none, else the period of a controller that runs more slowly than
-    the drive.
+    That time becomes the drive's sample time if the file has none. Otherwise it becomes the period of a controller that
+    runs more slowly than the drive.
     """
     if SAMPLE_TIME not in flat:
         return {}
@@ -290,10 +290,10 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 
 
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
-    """Return the coefficients of s and s^2 of second-order factors.
+    """Return the coefficients of s and s^2 of second-order factors, one pair for each factor.
 
-    They are made of factors 1 + t s with the `times` t, in pairs. With an odd number of times, the last factor is of
-    first order and has None for s^2.
+    The factors are products of two factors 1 + t s, for the `times` t. With an odd number of times, the last factor is
+    of first order and has None for s^2.
     """
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)

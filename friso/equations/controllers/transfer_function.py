@@ -65,8 +65,8 @@ class TransferFunction(RationalController):
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return zeros, poles and gain, whichever way the file gives them.
 
-        Raises InputError if the file gives them in none of the three ways, or in several. It is also raised for a
-        quotient that is not proper.
+        Raises InputError if the file gives them in none of the three ways, in several, or as a quotient that is not
+        proper.
         """
         if _ways(flat) != 1:
             actual = "none of them" if not _ways(flat) else "several of them"

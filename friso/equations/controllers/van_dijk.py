@@ -134,9 +134,9 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return a [controller] table for a crossover such as "8 Hz", with the usual alpha and beta.
+    """Return a [controller] table for a crossover such as "8 Hz", with alpha and beta as usual.
 
-    They are those of the examples.
+    The usual alpha and beta are those of the examples.
     """
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 

@@ -210,7 +210,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of the attraction [N/s], which measurements leave open, by its key.
 
-        It is a factor of ten each way. No virgin curve determines the attraction.
+        The range is a factor of ten each way, because no virgin curve determines the attraction.
         """
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}

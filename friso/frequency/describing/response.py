@@ -1,8 +1,8 @@
 """Compute the frequency response of a plant with friction, as a drive measures it.
 
-It depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force (Gelb,
-Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls with the
-amplitude are unstable; which of the others appears depends on the history of the analyser.
+The response depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force
+(Gelb, Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls
+with the amplitude are unstable; which of the others appears depends on the history of the analyser.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from friso.stage.tables import friction_law
 class OneStateLaw:
     """A friction law with at most one state z, as functions of parameters, velocity and z.
 
-    They give the rate of change of z and the force, each with its derivatives by z and velocity.
+    The functions return the rate of change of z and the force, each with its derivatives by z and velocity.
     """
 
     values: Mapping[str, Any]
@@ -81,9 +81,9 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
 
 @dataclass(frozen=True)
 class FrictionAnswer:
-    """Friction force [N] at the middles of intervals (M,), and the parts of its derivative.
+    """Friction force [N] at the middles of intervals (M,), and what its derivative is made of.
 
-    The derivative is by the velocities at the middles: see `along`.
+    The derivative is by the velocities at the middles; `along` applies it.
     """
 
     force: np.ndarray

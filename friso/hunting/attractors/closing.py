@@ -101,7 +101,7 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     """Return at which sample, with a fraction, the integrator balances the constant forces.
 
-    There the imbalance of both, `residuals`, passes zero. Among several such instants, the one with the longest
+    At this sample `residuals`, their imbalance, passes zero. Among several such samples, the one with the longest
     standstill before it counts; 0 is returned if there is none. `place` [m] is the position that sticks. Both arrays
     have the shape (samples,).
     """

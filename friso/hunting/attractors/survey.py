@@ -254,9 +254,9 @@ class Survey:
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """Close orbits from runs that repeat themselves; return the numbers of runs still to follow.
 
-        These runs swing and have no attractor in the survey yet. `ends` is how the runs ended in the last round, and
-        `owners`, shape (runs,), are the numbers of their stages. With `early`, orbits are closed only from runs that
-        repeat well and resemble no unstable cycle.
+        The runs to follow swing, and have no attractor in the survey yet. `ends` is how the runs ended in the last
+        round, and `owners`, shape (runs,), are the numbers of their stages. With `early`, orbits are closed only from
+        runs that repeat well and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)

@@ -65,7 +65,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Branch:
-    """Cycles in order along a branch, and the reasons why it ends on either side.
+    """A branch of cycles: its `points` in order, and why it `ends` on either side, in words.
 
     `sign` is -1 for cycles closed over half a period, 1 for cycles closed over a whole one.
     """

@@ -87,7 +87,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
     """Return the last stable cycle on a branch before a special point between two neighbours.
 
-    It lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
+    The cycle lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
     closed.
     """
     points = _enclosed(tracer, first, second, kind, precise)
@@ -242,9 +242,9 @@ def corrected(
 ) -> LocatedPoint | None:
     """Find the special point along a direction from an origin by the secant method.
 
-    It lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log time. The
-    search starts from the cycle `near` it, its approximate `states` (1, states), and the `slope` of the multiplier if
-    known. Returns None if there is no such point.
+    The point lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log
+    time. The search starts from the cycle `near` the point, its approximate `states` (1, states), and the `slope` of
+    the multiplier if known. Returns None if there is no such point.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]

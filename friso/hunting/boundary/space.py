@@ -60,7 +60,10 @@ class KeyRange:
 
 @dataclass(frozen=True)
 class Space:
-    """Stages with one key varied, or several, over their ranges."""
+    """Stages with one key varied, or several, over their ranges.
+
+    `flat` makes the keys [SI] of stages from values of the varied keys.
+    """
 
     ranges: tuple[KeyRange, ...]
     flat: FlatAt
@@ -82,8 +85,8 @@ class Space:
     def form(self) -> Structure:
         """Return the structure shared by all stages in the box.
 
-        It is taken from a stage at which no key is zero or a whole number. Simpler stages, with a stroke of zero or a
-        whole exponent, use it too.
+        The structure is that of a stage at which no key is zero or a whole number. Simpler stages, with a stroke of
+        zero or a whole exponent, use it too.
         """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 

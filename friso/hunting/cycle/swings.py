@@ -13,7 +13,10 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """First swings of runs, (runs, swings): turning points [m] and times [s], then NaN."""
+    """First swings of runs: turning points `values` [m] and their `times` [s], (runs, swings).
+
+    Entries after the last swing are NaN.
+    """
 
     values: np.ndarray
     times: np.ndarray

@@ -326,7 +326,7 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return which paths are on the irregular attractor of the path `first`, shape (points,).
 
-    They are if they spread over the same range.
+    Paths are on it if they spread over the same range.
     """
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (

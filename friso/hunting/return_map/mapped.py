@@ -231,8 +231,8 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 def unclosed(landing_map: LandingMap) -> list[int]:
     """Return the runs of a map's outermost points, where the map must be extended beyond them.
 
-    It must be if the next landing from the nearest or farthest point is not much nearer to the reference. The result
-    has the numbers of those runs, and is empty if there are none.
+    It must be extended if, from the nearest or farthest point, the next landing is not much nearer to the reference.
+    The result has the numbers of those runs, and is empty if there are none.
     """
     settings = ReturnMapSettings.current()
     runs = []
