@@ -168,7 +168,10 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
     """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-        """Return the gain per ampere and per turn of the motor, as far as these are known."""
+        """Return the gain with current for force, and per turn of the motor, as far as known.
+
+        On a linear axis the gain per millimetre is added.
+        """
         values = []
         if turn.per_ampere:
             shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)

@@ -18,7 +18,7 @@ from friso.stage.controllers import CONTROLLER
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of a stage, with its loop drawn (`diagram`) and its gains in the units of drives.
+    """The gains of a stage, with its loop drawn (`diagram`) and the gains in drives' units.
 
     `conversions` has the gains in these units. For a `kind` of drive, `parameters` holds its parameters by name.
     `not_held` lists the keys of the stage that these parameters cannot hold.

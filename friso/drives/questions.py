@@ -62,9 +62,9 @@ class UserAnswers:
                 raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 
     def value(self, key: str, field: Quantity | Number) -> float:
-        """Return an answer as a number in SI.
+        """Return an answer as a number in SI, if it is what the `field` allows.
 
-        Raises InputError for an answer that does not fit the field.
+        Raises InputError otherwise.
         """
         try:
             return float(field.read(self.texts[key]))

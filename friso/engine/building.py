@@ -94,7 +94,7 @@ class _Work:
     def _joined(self, request: CodeRequest, place: str) -> _Job:
         """Return the job of a request, started if necessary, and count one more waiting thread.
 
-        An abandoned job is started again.
+        `place` is the rank of a new job in the queue, in words. An abandoned job is started again.
         """
         with self._turn:
             job = self._jobs.get(request)

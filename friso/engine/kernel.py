@@ -253,7 +253,8 @@ class Kernel:
 class KernelRequest:
     """Request for a kernel: a structure, the solver's method, and how many runs to do at once.
 
-    With `variational`, small deviations from a run are integrated too; they may also be `along` keys of the stage file.
+    With `variational`, small deviations from a run are integrated too. Deviations of the keys `along` (names in the
+    stage file) then lead to deviations of the run.
     """
 
     structure: KernelForm

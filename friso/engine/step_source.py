@@ -544,7 +544,7 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """Write the drive's measurement at the instant of its sample, which may lie inside the step."""
+        """Write the code that stores what the drive measures at its sample, maybe inside the step."""
         clock = self.model.clock
         if not clock:
             return []

@@ -172,7 +172,7 @@ class Blocks(ABC):
     def handed_on(self, signal: Signal, name: str) -> Signal:
         """Pass a signal from a slower loop to a faster one, which holds it between slow samples.
 
-        Without sample times the signal is unchanged.
+        `name` names the held value. Without sample times the signal is unchanged.
         """
         return signal
 
@@ -351,7 +351,7 @@ def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.E
 
     That force is the symbol `STEADY.force`; the innermost integral, the last of `integrals`, supplies what is missing,
     and the others are 0. The argument `force` is what the controller computes in the steady motion, in terms of the
-    integrals. The result is empty without integrals.
+    integrals. The result maps integrals to states, and is empty without integrals.
     """
     if not integrals:
         return {}

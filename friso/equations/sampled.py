@@ -308,7 +308,10 @@ class Sampled(Blocks):
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
     def dither(self) -> Signal:
-        """Return the dither force at a sample; the number of turns is held and counted on."""
+        """Return the dither force at a sample.
+
+        Its number of turns is a held number, which grows at each sample.
+        """
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         turn = state("dither_turn")
         following = turn + frequency * SAMPLE_TIME

@@ -169,7 +169,7 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """Return a plant with one input behind another system, given by its matrices a, b, c, d.
+    """Return a plant with one input behind the system `first`, its matrices a, b, c, d.
 
     `name` names that system's states.
     """

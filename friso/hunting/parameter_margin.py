@@ -162,8 +162,8 @@ class _Side:
     def _pair(self, first: int) -> np.ndarray:
         """Choose two factors, by number, to search thoroughly around the first change.
 
-        Their distances from it are `proved_distances`: close to the end of hunting, motions take long to decay, and a
-        rough survey may be wrong. New factors are surveyed roughly.
+        Their distances from the change are `proved_distances`: close to the end of hunting, motions take long to decay,
+        and a rough survey may be wrong. Factors that were not surveyed yet are surveyed roughly.
         """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]

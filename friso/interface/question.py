@@ -117,7 +117,7 @@ class Question:
 
     @property
     def module(self) -> str:
-        """Return the name of the module that holds the function."""
+        """Return the name of the module that holds the question's function."""
         return f"{self.package}.question"
 
     @property

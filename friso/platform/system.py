@@ -98,7 +98,7 @@ if sys.platform == "win32":
     def check_free(path: Path) -> None:
         """Raise OSError if a file cannot be replaced.
 
-        The file is read-only, or another program holds it open.
+        That is so if the file is read-only, or if another program holds it open.
         """
         if not os.access(path, os.W_OK):
             raise OSError(errno.EROFS, "it is read-only", str(path))
@@ -318,7 +318,7 @@ def open_file(path: Path, flags: int) -> int:
 
 
 def replace_file(draft: Path, path: Path) -> None:
-    """Rename a file over another, once no other program holds that open. Raises OSError."""
+    """Rename a draft over a file, once no other program holds the file open. Raises OSError."""
     once_free(partial(draft.replace, path))
 
 

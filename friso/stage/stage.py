@@ -308,7 +308,7 @@ class Stage(Section):
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """Return the stage with dotted keys set, or removed by None, checked like a file.
 
-        Raises StageError.
+        Raises StageError for a change that makes no valid stage.
         """
         if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
             expected = "a dictionary of keys to new values"
@@ -435,17 +435,17 @@ _MOTOR_LAW = f"{MOTOR_FRICTION}.model"
 
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return unit, bound and example of every numeric key that a stage like this can have.
+    """Return unit, bound and example of every numeric key that a stage can have.
 
-    `flat` has the stage's keys, whose tables decide. Units are those of its axis.
+    `flat` has the stage's keys, which name its tables. Units are those of its axis.
     """
     return {key: field.on(axis_of(flat)) for key, field in declared_keys(flat).items()}
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return unit, bound and example of every numeric key, in the units of a linear axis.
+    """Return unit, bound and example of every numeric key that a stage can have.
 
-    `flat` has the keys of a stage, whose tables decide.
+    `flat` has the stage's keys, which name its tables. Units are those of a linear axis.
     """
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():

@@ -190,9 +190,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
         """Return `FITTED` elements on a virgin curve of rolling friction, at evenly spaced slopes.
 
-        `shape` has the exponent of the rolling friction and some factors. One factor for each element but the first
-        makes the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck
-        velocity.
+        `shape` has the exponent of the rolling friction, and factors. For each element but the first, one factor makes
+        the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck velocity.
         """
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)

@@ -82,7 +82,7 @@ class Starts:
     def _wound_up(self, which: np.ndarray, side: float) -> None:
         """Add runs released at distances on one side, with their integrators wound up.
 
-        `which` are the numbers of the stages; `side` is 1 or -1.
+        `which` are the numbers of the stages, which have a force limit; `side` is 1 or -1.
         """
         settings = SurveySettings.current()
         span, times = settings.wound_up_starts

@@ -48,7 +48,10 @@ class Point:
 
     @classmethod
     def of(cls, stages: Ensemble, place: float, cycle: Cycles, jacobians: np.ndarray | None = None) -> Point:
-        """Make the point of one cycle, from the stage that it belongs to and its place on the line."""
+        """Make the point of one cycle, from the stage that it belongs to and its place on the line.
+
+        `jacobians` is the Jacobian with which the cycle was closed, if it is known.
+        """
         distance = abs(float(cycle.states[0, stages.sticking]))
         return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle, jacobians)
 

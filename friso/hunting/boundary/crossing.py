@@ -53,7 +53,8 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 class FoldBack(NamedTuple):
     """A fold: how far along the branch it lies, where in the key's range, and with what error.
 
-    `place` runs from 0 to 1 over the key's range, and `reserve` bounds its error.
+    `length` is along the branch, from where the curve was fitted. `place` runs from 0 to 1 over the key's range, and
+    `reserve` bounds its error.
     """
 
     length: float

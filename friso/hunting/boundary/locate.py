@@ -25,7 +25,7 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class LocatedPoint:
-    """Point at which a branch loses or gains stability.
+    """Point at which a branch loses or gains stability, by a flip, a fold or a torus (`kind`).
 
     `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
     key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter

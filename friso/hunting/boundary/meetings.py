@@ -99,9 +99,10 @@ def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
 
 
 def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return where on each leg of a path, (n, 2), the point nearest to `at`, shape (2,), lies.
+    """Return where on each leg of a path the point nearest to `at`, shape (2,), lies.
 
-    The results run from 0 at the start of a leg to 1 at its end.
+    The legs are the straight pieces between the points of the path, (n, 2). The results, (n - 1,), run from 0 at the
+    start of a leg to 1 at its end.
     """
     legs = np.diff(path, axis=0)
     return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)

@@ -152,7 +152,10 @@ def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of grid neighbours, the first inside the region and the second outside."""
+    """Return pairs of grid neighbours, the first of them inside and the second outside.
+
+    `inside` and `outside`, shape (nodes, nodes), mark the nodes of the grid.
+    """
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -177,8 +180,8 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """Follow a cycle towards a neighbouring stage, to where it loses stability or folds.
 
-    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change, or None,
-    and whether the cycle reaches the neighbour unchanged.
+    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change (None:
+    there is none, or it could not be located), and whether the cycle reaches the neighbour unchanged.
     """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))

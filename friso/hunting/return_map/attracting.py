@@ -197,8 +197,8 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     """Return after how many swings a run's last landings repeat; 0 if they do not.
 
-    At least `least` swings are asked for. `path`, shape (landings,), has the signed landings; those of a `symmetric`
-    stage may repeat on the other side.
+    Repetitions after fewer than `least` swings do not count. `path`, shape (landings,), has the signed landings; those
+    of a `symmetric` stage may repeat on the other side.
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

@@ -161,7 +161,7 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """Return the map's attractors, in which a stage swings for ever; any point may lead there."""
+        """Return the map's attractors, in which a stage swings for ever, from any of its points."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))

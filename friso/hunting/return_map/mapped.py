@@ -66,7 +66,7 @@ class Mapped:
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
-        """Select the stages with these numbers, each once, and their runs."""
+        """Select the stages with these numbers, none of them twice, and their runs."""
         which = np.flatnonzero(np.isin(self.owners, numbers))
         owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
         runs = (self.starts[which], self.continued[which], self.landings.take(which))
