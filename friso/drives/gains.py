@@ -76,7 +76,8 @@ def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     """Return the keys of [controller] that the parameters of a drive cannot hold.
 
-    `held` are the names that they hold. A filter counts once. Values of 0 and mere choices are left out.
+    `held` are the names of the keys that the parameters hold. A filter counts once. Values of 0 and mere choices are
+    left out.
     """
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]

@@ -187,7 +187,7 @@ class StepWriter:
     def source(self) -> str:
         """Write the function `step(B, rtol, inner, outer, budget)` for one run.
 
-        It returns true if something happened in the step that the loops around it must record.
+        The function returns true if something happened in the step that the loops around it must record.
         """
         body = [
             *self._load(),
@@ -212,10 +212,10 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """Write the function `locate(B)` for one run; nothing for a model without a clock.
+        """Write the function `locate(B)` for one run; "" for a model without a clock.
 
-        It finds out whether a table cell has been `left`, and whether a sample is to be `noted`, if the drive has
-        `ticked`. It returns true for either.
+        The function sets the flag `left` if the run has left a table cell, and the flag `noted` if a sample is to be
+        noted, because the drive has `ticked`. It returns true for either.
         """
         if not self.model.clock:
             return ""
@@ -242,8 +242,8 @@ class StepWriter:
     def update_source(self) -> str:
         """Write the function `update(B)` for one run.
 
-        It looks up tables and, if the drive has `ticked`, sets the held numbers from the last sample, and the time of
-        the next tick. Modes with memory stay as at the beginning of the step.
+        The function looks up tables and, if the drive has `ticked`, sets the held numbers from the last sample, and the
+        time of the next tick. Modes with memory stay as at the beginning of the step.
         """
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]

@@ -38,8 +38,8 @@ def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.M
 
     An original function, with the arguments `(B, *numbers)`, works on a column of numbers B[row]. The compiled function
     does so for every run in a flat float64 buffer. There the numbers of all runs, one in each lane, lie side by side in
-    a row. The `numbers` are common to all runs. It takes the buffer's address and the numbers, and returns a whole
-    number. Bit k is set if the original would return true for lane k.
+    a row. The compiled function takes the buffer's address and the numbers, which are common to all runs. It returns a
+    whole number, whose bit k is set if the original would return true for lane k.
     """
     module = ir.Module()
     for name, function in functions.items():

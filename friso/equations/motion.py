@@ -115,7 +115,7 @@ def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
 def rests(flat: Mapping[str, Any]) -> bool:
     """Tell whether the reference stands still in the end, so that a stage can hunt.
 
-    `flat` has the keys of stages; all of them must.
+    `flat` has the keys of one stage or several; the result is true if that holds for all of them.
     """
     return motion_of(flat).rests or _ends_without(1, flat)
 

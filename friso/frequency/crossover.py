@@ -192,8 +192,8 @@ class _Search:
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
         """Return frequencies [rad/s] that resolve the loop at all crossovers, and a loop function.
 
-        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. These do
-        not depend on the crossover, so that the distance from -1 is a smooth function of it.
+        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. The
+        frequencies do not depend on the crossover, so that the distance from -1 is a smooth function of it.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]

@@ -149,8 +149,8 @@ def _ends_observed(
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
     """Return which runs swing as far as the observed attractor, but too seldom, (count,).
 
-    They do not swing so within the last period of the attractor, `target`, so that it is unknown whether they end
-    there. `ends` marks runs that do, and `swing` [m] is peak to peak over a longer time.
+    It is unknown whether such runs end in the attractor, `target`. `ends` marks runs that swing so within its last
+    period, and `swing` [m] is peak to peak over a longer time.
     """
     return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 

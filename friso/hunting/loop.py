@@ -107,7 +107,8 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 def leaves_for_good(stage: Stage) -> bool:
     """Tell whether a stage that has left the range of all runs diverges for ever.
 
-    It does if the loop is unstable and no force limit with anti-windup can catch it in a larger swing.
+    The result is true if the loop is unstable and no force limit with anti-windup can catch the stage in a larger
+    swing.
     """
     stages = Ensemble.held(stage.flat(), 1)
     controller = stages.structure.controller

@@ -81,8 +81,8 @@ class StageAttractors(ArrayRows):
 def can_hunt(flat: Mapping[str, Any]) -> bool:
     """Tell whether stages of one structure may hunt; `flat` has their keys in SI.
 
-    They need friction or a backlash, integral action that winds up, no dither, and a reference that stands still in the
-    end.
+    To hunt, stages need friction or a backlash, integral action that winds up, no dither, and a reference that stands
+    still in the end.
     """
     return not why_not(shared_structure(flat)) and not keeps_moving(flat)
 

@@ -63,7 +63,7 @@ class ParameterMargin:
     def certain(self) -> bool:
         """Tell whether no side is open, and both ends, if there are any, are certain.
 
-        Ranges between the tried values may still differ.
+        Between the tried values, hunting may still begin and end unnoticed.
         """
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 

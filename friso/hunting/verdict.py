@@ -298,8 +298,8 @@ class OwnMotion:
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Run the stage's own motion, also with slightly different masses, and find how it ends.
 
-    The motion hunts if it ends in a swing of the size and period of `target`. If it still swings, but less far or less
-    often, it may be decaying. It is continued if the given work suffices.
+    The motion hunts if it ends in a swing of the size and period of `target`. A motion that still swings, but less far
+    or less often, may be decaying. It is then continued, if the given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()

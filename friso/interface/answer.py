@@ -143,7 +143,7 @@ class Answer:
 
     @property
     def subject(self) -> Any:
-        """Return the argument of the functions that show the answer.
+        """Return what the functions that show the answer take as their argument.
 
         The subject is the result, or the answer itself if it has attributes besides.
         """

@@ -104,7 +104,10 @@ class Question:
     """Module whose function `run` replaces the usual command, which only shows the answer."""
 
     def __post_init__(self) -> None:
-        """Check the topic, and the place in the list of commands. Raises ValueError or TypeError."""
+        """Check the topic, and the place in the list of commands.
+
+        Raises ValueError for an unknown topic, and TypeError for a place that is no number.
+        """
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
         if not isinstance(self.place, int | float):

@@ -41,9 +41,9 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 
 def unwritable(path: Path) -> tuple[str, str] | None:
-    """Return why nothing can be written to a path, and what can be; None if it may be written.
+    """Return why nothing can be written to a path, and what is expected instead; None if it can.
 
-    The path may have no name, a name that is too long, or one that Windows does not accept.
+    Both are in words. The path may have no name, a name that is too long, or one that Windows does not accept.
     """
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"

@@ -107,8 +107,9 @@ def balanced(
     """Return the periodic motion near a known one, with harmonics up to the order `harmonics`.
 
     `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion. The last sample
-    lies one interval before the first comes again. A `mirrored` motion is its own mirror image after half a period.
-    Raises InputError for a stage without friction or for a law with more than one state of its own.
+    lies one interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. The
+    friction force is computed in `intervals` per period (None: as the settings say). Raises InputError for a stage
+    without friction or for a law with more than one state of its own.
     """
     settings = FrequencySettings.current()
     law, size = (
@@ -149,7 +150,7 @@ class _Problem:
     """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
 
     Unknowns are real and imaginary parts of the harmonics, divided by `length` [m], the amplitude of the known motion.
-    The last one is the logarithm of omega over the `omega` of that motion. `start` has the harmonics of the known
+    The last unknown is the logarithm of omega over the `omega` of that motion. `start` has the harmonics of the known
     motion, which also fixes the phase.
     """
 

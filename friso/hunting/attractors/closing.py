@@ -67,7 +67,7 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Return which orbits repeat the simpler orbit `once` by `passes` times, shape (count,).
+    """Return which orbits, shape (count,), only repeat the simpler orbit `once`, `passes` times.
 
     Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
     """

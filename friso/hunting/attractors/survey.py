@@ -190,7 +190,10 @@ class Survey:
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Return which stages diverge from farther starts than those that come to rest, (count,)."""
+        """Return which unbounded stages diverge from far off, shape (count,).
+
+        Their farthest start from which a run diverges is farther than any from which a run comes to rest.
+        """
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:

@@ -116,9 +116,9 @@ class Tracer:
     ) -> Point | None:
         """Find the cycle on a plane in the space of place, log distance and log time.
 
-        The plane passes through `target` with the normal `normal`. The search starts from the cycle `near` it, or from
-        its own approximate `states` (1, states). It uses the Jacobian of the nearby cycle first, then a new one.
-        Returns None if no cycle is found.
+        The plane passes through `target` with the normal `normal`. The search starts from the cycle `near` the plane,
+        or from approximate `states` (1, states) of the cycle sought. It uses the Jacobian of the nearby cycle first,
+        then a new one. Returns None if no cycle is found.
         """
         point = self._solved(near, target, normal, states)
         if point is None and near.jacobians is not None:

@@ -106,8 +106,8 @@ class CurveTracer:
     ) -> Spot | None:
         """Find the point of the curve on a line, at most `reach` from the line's `origin`.
 
-        The line has the direction `across`. The search starts from the point `near` it, or from the `expected` one.
-        Returns None if it fails.
+        The line has the direction `across`. The search starts from the known point `near` the one sought, or from the
+        `expected` one. Returns None if it fails.
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)

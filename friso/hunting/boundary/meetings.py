@@ -86,7 +86,7 @@ class _Nearest(NamedTuple):
 
 
 def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
-    """Find what is nearest on a curve to coordinates in the box, shape (2,).
+    """Find the point of a curve nearest to coordinates in the box, shape (2,), and its cycle.
 
     The curve is straight between its points.
     """
