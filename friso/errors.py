@@ -59,7 +59,7 @@ class InputError(ValueError):
         return type(self)(self.key, self.actual, self.expected, self.example, origin, self.also)
 
     def together(self, others: "Iterable[InputError]") -> Self:
-        """Return a copy that also says what else is wrong."""
+        """Return a copy that also says what else is wrong, by the errors `others`."""
         also = (pair for error in others for pair in ((error.key, error.actual), *error.also))
         return type(self)(
             self.key, self.actual, self.expected, self.example, self.origin, tuple(dict.fromkeys((*self.also, *also)))

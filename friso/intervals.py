@@ -58,7 +58,7 @@ class Interval:
         return self.form == "range" and self.low > 0 and self.high > WIDE * self.low
 
     def at(self, share: Any) -> Any:
-        """Return the values at fractions, from 0 to 1, of the way from low to high."""
+        """Return the values at fractions `share`, from 0 to 1, of the way from low to high."""
         return self.low + share * (self.high - self.low)
 
     def evenly(self, share: Any) -> Any:

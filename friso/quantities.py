@@ -35,7 +35,7 @@ ROUNDING = 1e-9
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
     """Write a fraction in percent to some digits; a dash if it is NaN or infinite.
 
-    A fraction as small as rounding errors is 0. With `signed`, positive fractions get a plus.
+    `share` is the fraction, and one as small as rounding errors is 0. With `signed`, positive fractions get a plus.
     """
     if not math.isfinite(share):
         return NOTHING
@@ -308,7 +308,7 @@ def _split(entry: str) -> tuple[str, str]:
 def in_unit_of(before: Any, entry: Any) -> Any:
     """Return a number completed by the unit of the text `before`; other entries unchanged.
 
-    A unit that is only wrong in its capitals is corrected.
+    `entry` is the number or entry. A unit that is only wrong in its capitals is corrected.
     """
     bare = isinstance(entry, int | float) and not isinstance(entry, bool) and abs(entry) < LARGEST
     text = repr(entry) if bare else entry.strip() if isinstance(entry, str) else ""
@@ -443,12 +443,19 @@ def _factor(unit: str, si_unit: str, motor: Motor | None = None) -> float:
 
 
 def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
-    """Tell whether a unit lacks "per radian" to be of the right kind: N m for N m/rad."""
+    """Tell whether a unit lacks "per radian" to be of the right kind: N m for N m/rad.
+
+    `root` and `si_root` are the powers of pint's root units in the unit and in the right one.
+    """
     return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
 
 
 def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -> bool:
-    """Tell whether a unit has amperes in place of newtons: A/m for N/m, or A*s^2/rad for an inertia."""
+    """Tell whether a unit has amperes in place of a force, such as A/m for N/m.
+
+    Another example is A*s^2/rad for an inertia. `root` and `si_root` are the powers of pint's root units in the unit
+    and in the right one; `force` is "N" or "N*m".
+    """
     if root.get("ampere") != 1 or "ampere" in si_root:
         return False
     _, per_ampere, _ = _root(f"{force}/A")
@@ -458,21 +465,28 @@ def _in_amperes(root: dict[str, float], si_root: dict[str, float], force: str) -
 
 
 def _per_angle(root: dict[str, float], motor: Motor | None) -> bool:
-    """Tell whether a unit has amperes per angle although a `motor` moves a linear axis."""
+    """Tell whether a unit has amperes per angle although a `motor` moves a linear axis.
+
+    `root` has the powers of pint's root units in the unit.
+    """
     return bool(motor and motor.force == "N" and root.get("ampere") == 1 and root.get("radian", 0) < 0)
 
 
 def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:
-    """Return a hint if a unit would be valid on a rotary axis; "" if not."""
+    """Return a hint if a unit would be valid on a rotary axis; "" if not.
+
+    `root` has the powers of pint's root units in the unit, and `si_unit` is valid on a linear axis.
+    """
     turned = ROTARY.unit(si_unit)
     fits = turned != si_unit and root == _root(turned)[1]
     return f"; it would be of a rotary axis, {ROTARY.described}" if fits else ""
 
 
 def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:
-    """Return the factor of a frequency to Hz; `pint` alone takes 1 Hz for 1 rad/s.
+    """Return the factor of a frequency to Hz, from its factor to pint's root units.
 
-    A plain 1/s could be either and is refused with _Refused.
+    `root` has the powers of these units, and `names` are the units named. `pint` alone takes 1 Hz for 1 rad/s. Raises
+    _Refused for a plain 1/s, which could be either, and for anything but a frequency.
     """
     if root == {"radian": 1, "second": -1}:
         return factor / (2 * math.pi)

@@ -14,8 +14,8 @@ DOUBT = 0.05
 class Share:
     """The probability of an outcome, estimated from runs, with its 95 % interval.
 
-    The interval (Clopper, Pearson) holds whatever the outcome of failed runs would have been. The probability is NaN if
-    no run succeeded.
+    The interval, from `low` to `high` (Clopper, Pearson), holds whatever the outcome of failed runs would have been.
+    The probability is NaN if no run succeeded.
     """
 
     probability: float

@@ -124,7 +124,10 @@ def show(
 
 @contextmanager
 def named_as_options(names: Collection[str]) -> Iterator[None]:
-    """Let an InputError about a keyword name the command-line option instead."""
+    """Let an InputError in the `with` block name a command-line option instead of a keyword.
+
+    `names` are the keywords for which this holds.
+    """
     try:
         yield
     except InputError as error:

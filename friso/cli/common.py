@@ -26,7 +26,7 @@ def say(message: str) -> None:
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
-    """Print a table with named rows.
+    """Print a table with a title and named rows, each with one text per column.
 
     Columns that do not fit side by side are printed in further tables below.
     """
@@ -68,9 +68,10 @@ def _narrow(texts: Sequence[str]) -> int:
 
 
 def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
-    """Group columns into tables that fit the width, by index.
+    """Group columns into tables that fit a width of `room` characters, by index.
 
-    The first column, which names the rows, is in every table, with at least one other column.
+    `narrow` has the least width of each column. The first column, which names the rows, is in every table, with at
+    least one other column.
     """
     parts = [[0]]
     for k in range(1, len(narrow)):
@@ -81,7 +82,7 @@ def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
 
 
 def print_wrapped(sentence: str, indent: str = "") -> None:
-    """Print a sentence in lines as wide as the terminal."""
+    """Print a sentence in lines as wide as the terminal, each after the `indent`."""
     width = shutil.get_terminal_size().columns
     lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
     print(textwrap.indent("\n".join(lines), indent))

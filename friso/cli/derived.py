@@ -115,9 +115,9 @@ def _option(parameter: CommandParameter) -> Parameter:
 
 
 def _typed(parameter: CommandParameter, info: Any, default: Any) -> Parameter:
-    """Build a parameter with the type that typer expects.
+    """Build a parameter with the type that typer expects; one that may be repeated takes a list.
 
-    A parameter that may be repeated takes a list.
+    `info` describes it to typer. A parameter without a `default` may be None.
     """
     one: Any = parameter.kind.command_type
     value = list[one] if parameter.kind.several else one
@@ -129,7 +129,7 @@ def _of_the_shell(question: Question) -> Iterator[Parameter]:
     """Yield the options that say where the answer goes: --out, --overwrite, --json and --details."""
 
     def option(name: str, default: Any, annotation: Any, declared: str, help: str, **more: Any) -> Parameter:
-        """Build an option with its default, type and help."""
+        """Build an option called `declared` on the command line, with its default, type and help."""
         info = typer.Option(declared, help=help, **more)
         return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[annotation, info])
 

@@ -78,7 +78,10 @@ def spelled(text: str, encoding: str) -> str:
 
 
 def _spelled(error: UnicodeError) -> tuple[str, int]:
-    """Replace characters that an encoding lacks; this is the error handler of streams."""
+    """Return a replacement for characters that an encoding lacks, and where to go on.
+
+    This is the error handler of streams. Any other error is raised again.
+    """
     if not isinstance(error, UnicodeEncodeError):
         raise error
     return "".join(map(_spelling, error.object[error.start : error.end])), error.end

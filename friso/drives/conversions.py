@@ -34,7 +34,7 @@ Other = tuple[float, str]
 class Conversion:
     """One gain of a controller: its name, its symbol, and its value in several units.
 
-    The first of the values is in SI. Each value stands beside its unit.
+    Values stand beside their units; the first one is in SI.
     """
 
     name: str
@@ -168,7 +168,10 @@ def _per(unit: str, *per: tuple[str, float]) -> Convert:
     """
 
     def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-        """Return the gain per ampere and per turn of the motor, as far as these are known."""
+        """Return the gain with current for force, and per turn of the motor, as far as known.
+
+        On a linear axis the gain per millimetre is added.
+        """
         values = []
         if turn.per_ampere:
             shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)

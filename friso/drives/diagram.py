@@ -47,7 +47,7 @@ class Canvas:
     def sum(self, above: str = "", below: str = "", minus: bool = True, deep: bool = False) -> None:
         """Add a sum of the signal and of what enters from above or below.
 
-        A signal from below is subtracted, or added if `minus` is False. It is drawn one line lower if `deep`.
+        What enters from below is subtracted, or added if `minus` is False, and drawn one line lower if `deep`.
         """
         self.lines[MAIN] += "--(+)"
         place = len(self.lines[MAIN]) - 2

@@ -108,7 +108,10 @@ class AsStage:
 
 @dataclass(frozen=True)
 class Parameters:
-    """Parameters of a drive by name, and the names in [controller] that they hold."""
+    """Parameters of a drive: their `values` by name.
+
+    `held` are the names of the keys of [controller] that these parameters hold.
+    """
 
     values: Mapping[str, float]
     held: frozenset[str]
@@ -158,5 +161,8 @@ def si(value: float, unit: str) -> str:
 
 
 def lacks(what: str, expected: str, example: str = "") -> InputError:
-    """Build the error for a controller that a parameter format cannot hold."""
+    """Build the error for a controller that a parameter format cannot hold.
+
+    `what` is the controller, and `expected` the kind of controller that the format can hold.
+    """
     return InputError("controller", what, expected, example)

@@ -18,10 +18,10 @@ from friso.stage.controllers import CONTROLLER
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains of a stage, with its loop drawn and its gains in the units of drives.
+    """The gains of a stage, with its loop drawn (`diagram`) and the gains in drives' units.
 
-    For a `kind` of drive, `parameters` holds its parameters by name. `not_held` lists the keys of the stage that these
-    parameters cannot hold.
+    `conversions` has the gains in these units. For a `kind` of drive, `parameters` holds its parameters by name.
+    `not_held` lists the keys of the stage that these parameters cannot hold.
     """
 
     stage: Stage
@@ -74,9 +74,10 @@ def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
-    """Return the keys of [controller] that the parameters cannot hold.
+    """Return the keys of [controller] that the parameters of a drive cannot hold.
 
-    A filter counts once. Values of 0 and mere choices are left out.
+    `held` are the names of the keys that the parameters hold. A filter counts once. Values of 0 and mere choices are
+    left out.
     """
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]

@@ -62,9 +62,9 @@ class UserAnswers:
                 raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 
     def value(self, key: str, field: Quantity | Number) -> float:
-        """Return an answer as a number in SI.
+        """Return an answer as a number in SI, if it is what the `field` allows.
 
-        Raises InputError for an answer that does not fit the field.
+        Raises InputError otherwise.
         """
         try:
             return float(field.read(self.texts[key]))
@@ -80,7 +80,7 @@ class UserAnswers:
     def kind_of(self, key: str, fields: Mapping[AxisKind, Quantity]) -> tuple[AxisKind, float]:
         """Return the kind of axis that an answer's unit implies, and the answer in SI.
 
-        Raises InputError if the unit fits no kind of axis.
+        `fields` say, for each kind of axis, what the answer may be. Raises InputError if the unit fits no kind of axis.
         """
         for kind, field in fields.items():
             try:
@@ -121,14 +121,18 @@ def _of_table(
 ) -> list[OpenQuestion]:
     """Build one open question for each named key of a table of the stage file.
 
-    Unit and example follow from the kind of axis, linear or rotary.
+    `section` is the class that reads the table, and `meaning` says what each key means. Unit and example follow from
+    the kind of axis, linear or rotary.
     """
     fields = {name: field.on(kind) for name, field in numeric_fields(section).items()}
     return [OpenQuestion(f"{table}.{name}", meaning[name], fields[name].written_example) for name in names]
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
-    """Refuse to go on while questions are open. Raises InputError that lists them all."""
+    """Refuse to go on while questions are open.
+
+    Raises InputError that lists them all, and names the file or option `origin`.
+    """
     asked = list(questions)
     if asked:
         values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"

@@ -73,9 +73,10 @@ class BatchOptions(NamedTuple):
 class Results(NamedTuple):
     """Outputs of the n runs of a batch.
 
-    They are statistics (n, len(STATISTICS)), status (n,), and turning points (n, capacity) with their count (n,).
-    Samples hold states and the numbers held between samples, (n, samples, states + held); `ends` hold both at the end
-    of the run.
+    - `statistics` (n, len(STATISTICS)) and `statuses` (n,).
+    - `turn_times` [s] and `turn_values` [m] (n, capacity): turning points, of which `turn_counts` (n,) are valid.
+    - `samples` (n, samples, states + held): states, and numbers held between samples.
+    - `ends` (n, states + held): states and held numbers at the end of the run.
     """
 
     statistics: np.ndarray

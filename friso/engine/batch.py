@@ -42,11 +42,15 @@ MORE = 2
 class RunOptions:
     """Options of runs.
 
-    They are, in the order of the fields: relative tolerance, step budget, and number of threads; bands of settling [m];
-    start of the window for extremes, as a fraction of the run; time [s] from which turning points are kept, at most
-    half of the run; smallest swing [m] between two turning points, one number or one per run, below which legs of a
-    zigzag are skipped; room for turning points at first; sampling interval [s] (None: no samples); and a flag, shape
-    (1,): once another thread sets it, no further run begins.
+    - `rtol`: relative tolerance; `bands` [m]: the two bands of settling.
+    - `window`: start of the window for extremes, as a fraction of the run.
+    - `record_from` [s]: time from which turning points are kept, at most half of the run; `room`: how many, at first.
+    - `least_swing` [m]: smallest swing between two turning points, one number or one per run, below which legs of a
+      zigzag are skipped.
+    - `interval` [s]: between samples (None: no samples).
+    - `budget`: most steps of a run; `threads`: how many (None: as many as there are cores to use).
+    - `chunk`: most runs that are prepared at once.
+    - `cancel`: a flag, shape (1,); once another thread sets it, no further run begins.
     """
 
     rtol: float = 1e-6
@@ -88,7 +92,7 @@ def run_chunks(
 ) -> Iterator[Runs]:
     """Run `runs` stages of one structure, in chunks.
 
-    `flat` has the stages' keys, such as "friction.static", with SI numbers or arrays of shape (runs,). They start at
+    `flat` has the stages' keys, such as "friction.static", with SI numbers or arrays of shape (runs,). Stages start at
     rest, displaced as the motion says, or from the states `starts`, shape (runs, states). In `starts`, modes with
     memory may follow the states; otherwise they are derived from the states. In a chunk, runs with many turning points
     come last. Results do not depend on how many runs are computed at once. A failed run has a status; the others go on.
@@ -104,7 +108,7 @@ def prepare(
 ) -> Batch:
     """Make the input of the compiled code for the runs of one chunk.
 
-    They begin in the states `starts`, or as the motion says. `flat` has the stages' keys in SI.
+    Runs begin in the states `starts`, or as the motion says. `flat` has the stages' keys in SI.
     """
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
@@ -126,7 +130,7 @@ def prepare(
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Return the initial states of stages at rest, their masses displaced as the motion says.
+    """Return the initial states of stages at rest, (runs, states), displaced as the motion says.
 
     Filters have settled, and the actuator carries the constant forces.
     """
@@ -169,9 +173,10 @@ def _run_with_room(
     options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
-    """Run the numbered runs, with `room` for turning points.
+    """Run the numbered runs from their `starts`, with `room` for turning points.
 
-    Runs with too many turning points are repeated, fewer at a time, with more room for each.
+    Runs with too many turning points are repeated, fewer at a time, with more room for each. Without `starts`, runs
+    begin as their motions say.
     """
     part = part_of(flat, numbers)
     least = options.least_swing

@@ -28,9 +28,10 @@ from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
-    """Compile a model's code by a pickled task, or without one the loops that run it.
+    """Compile a model's code, for the request in a pickled task.
 
-    The code goes into a `folder` of the cache. Returns the name of the entry.
+    Without a task, the loops that run any model's code are compiled. The code goes into a `folder` of the cache.
+    Returns the name of the entry.
     """
     if not task:
         return keep(folder, inspect.getsource(driver), _loops_code)

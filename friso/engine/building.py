@@ -94,7 +94,7 @@ class _Work:
     def _joined(self, request: CodeRequest, place: str) -> _Job:
         """Return the job of a request, started if necessary, and count one more waiting thread.
 
-        An abandoned job is started again.
+        `place` is the rank of a new job in the queue, in words. An abandoned job is started again.
         """
         with self._turn:
             job = self._jobs.get(request)
@@ -106,7 +106,10 @@ class _Work:
             return job
 
     def _leave(self, jobs: list[_Job], overtaken: bool) -> list[_Job]:
-        """Stop waiting for jobs; return the abandoned ones, for which nobody else waits."""
+        """Stop waiting for jobs; abandon and return those for which nobody else waits.
+
+        If the wait was `overtaken`, jobs that are being compiled go on.
+        """
         with self._turn:
             for job in jobs:
                 job.waiting -= 1
@@ -190,7 +193,7 @@ class _Job:
 
     @contextmanager
     def _held(self, lock: FileLock) -> Iterator[None]:
-        """Hold the lock of the request, waiting until no other process holds it."""
+        """Hold the lock of the request in the `with` block, once no other process holds it."""
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -202,7 +205,7 @@ class _Job:
 
     @contextmanager
     def _core(self) -> Iterator[None]:
-        """Occupy a core while building."""
+        """Occupy a core in the `with` block, while building."""
         while not self._cores.acquire(timeout=_PATIENCE):
             self._go_on()
         try:
@@ -239,7 +242,7 @@ class _Job:
 class _Surroundings:
     """Conditions under which a builder was started: process, cache, module folders, plug-ins.
 
-    Another builder is needed if they change.
+    Another builder is needed if one of them changes. The process is the one that started it.
     """
 
     process: int

@@ -236,7 +236,7 @@ def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> s
 
 
 def entry_lock(file: Path) -> FileLock:
-    """Return the lock for writing or deleting an entry; several entries may share it."""
+    """Return the lock for writing or deleting the entry in a `file`; entries may share a lock."""
     return FileLock(file.parent / f"{file.name[:2]}.lock", mode=0o600)
 
 

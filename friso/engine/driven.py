@@ -22,9 +22,9 @@ CHUNK, FEWEST, MOST = 4e6, 16, 256
 class Inputs:
     """Inputs of driven runs: reference [m], shape (n,), and force on the stage [N].
 
-    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Both are sampled
-    every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and linear between
-    samples. The force is linear too, or constant if `held`, as in a sampled drive.
+    The force has the shape (n,), or (runs, n) for individual forces, and adds to the controller's. Reference and force
+    are sampled every `sample_time` [s]. The velocity at each sample is the central difference of the reference, and
+    linear between samples. The force is linear too, or constant if `held`, as in a sampled drive.
     """
 
     reference: np.ndarray
@@ -70,7 +70,7 @@ class DrivenRuns:
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[DrivenRuns]:
-    """Run stages that follow a log, from the states `starts`, in chunks.
+    """Run stages that follow the log `inputs`, from the states `starts`, in chunks.
 
     `flat` has the keys of the stages, of one structure, with SI numbers or arrays of shape (runs,); `starts` has the
     shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
@@ -99,7 +99,10 @@ def run_driven(
 
 
 def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
-    """Return the keys of some stages, with a motion as long as the log, and of a `size` [m]."""
+    """Return the keys of the numbered stages, with a motion as long as the log.
+
+    The motion is a step of a `size` [m], by which the equations are scaled.
+    """
     part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
     duration = len(inputs.reference) * inputs.sample_time
     return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}

@@ -133,8 +133,8 @@ def note_entry(B, layout, lane, row, fraction, start, end, band):
 def note_turn(B, layout, lane, fraction, batch, settings, results):
     """Record the turning point of a run's deviation inside its last step, if there is one.
 
-    It counts for the extremes, for the last times outside both bands, and as a turning point to be stored. Only the
-    `fraction` of the step that was accepted counts. The run is the one in `lane`.
+    The turning point counts for the extremes, for the last times outside both bands, and among the points to be stored.
+    Only the `fraction` of the step that was accepted counts. The run is the one in `lane`.
     """
     before, after = deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
@@ -192,7 +192,8 @@ def write_states(B, layout, lane, row):
 def note_samples(B, layout, lane, fraction, interval, samples):
     """Write a run's states at the sampling instants inside its last step into `samples`.
 
-    They are interpolated between the step's ends. `fraction` is the part of the step that counts.
+    Instants follow one another every `interval` [s], and states are interpolated between the step's ends. `fraction` is
+    the part of the step that counts.
     """
     next_sample = ROW.next_sample * layout.lanes + lane
     if B[next_sample] == np.inf:
@@ -436,7 +437,10 @@ def stands(B, layout, lane):
 
 
 def look_inside(B, layout, lane, fraction, batch, settings, results):
-    """Record when the run in a lane entered a band, or turned, in its last step."""
+    """Record when the run in a lane entered a band, or turned, in its last step.
+
+    Only the `fraction` of the step that was accepted counts.
+    """
     start, end = deviation(B, layout, lane, 0.0), deviation(B, layout, lane, fraction)
     note_entry(B, layout, lane, ROW.inner_exit, fraction, start, end, settings.inner)
     note_entry(B, layout, lane, ROW.outer_exit, fraction, start, end, settings.outer)

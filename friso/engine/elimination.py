@@ -33,9 +33,9 @@ class Elimination:
     code: tuple[str, ...]
 
     def solve(self, name: str) -> list[str]:
-        """Return code that solves in place for a vector.
+        """Return code that solves the system for a right-hand side, which the solution replaces.
 
-        The vector's entries are called `name` followed by the row.
+        The entries of the right-hand side are called `name` followed by the row.
         """
         forward = [f"{name}{i} = {name}{i} - L_{i}_{k} * {name}{k}" for i, k in self.lower]
         backward = [
@@ -48,9 +48,9 @@ class Elimination:
 def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
     """Write the elimination of a matrix with entries ``A_i_j`` at `nonzero` and on the diagonal.
 
-    Rows not in `diagonal` have the variable ``diagonal``, 1/(gamma h), on the diagonal; the variable ``inverse`` is its
-    inverse. The pivot order is improved by exchanging two pivots until no exchange makes one factorisation and `solves`
-    solutions cheaper.
+    The matrix has `size` rows. Rows not in `diagonal` have the variable ``diagonal``, 1/(gamma h), on the diagonal; the
+    variable ``inverse`` is its inverse. The pivot order is improved by exchanging two pivots until no exchange makes
+    one factorisation and `solves` solutions cheaper.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)
@@ -68,7 +68,10 @@ def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: 
 
 
 def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
-    """Return the order of the pivots: always the one that causes the fewest products first."""
+    """Return the order of the pivots: always next the one that causes the fewest products.
+
+    The matrix has `size` rows and is not zero at `nonzero`.
+    """
     pattern, left, order = set(nonzero), set(range(size)), []
     while left:
         rows = {k: [i for i in left if i != k and (i, k) in pattern] for k in left}
@@ -81,9 +84,11 @@ def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
 
 
 def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
-    """Estimate the processor clocks of a factorisation and `solves` solutions.
+    """Estimate the processor clocks of one factorisation and `solves` solutions.
 
-    The estimate is the longest chain of operations that wait for each other, plus some time for every operation.
+    Pivots are taken in this `order`. The matrix is not zero at `nonzero`; rows not in `diagonal` have a common number
+    on the diagonal. The estimate is the longest chain of operations that wait for each other, plus some time for every
+    operation.
     """
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0

@@ -68,7 +68,10 @@ class Kernel:
         return STEP + OPERATION * len(_OPERATIONS.findall(step)) + CALL * len(_CALLS.findall(step))
 
     def run(self, queue: np.ndarray, batch: Batch, settings: BatchOptions, results: Results) -> None:
-        """Compute this thread's share of a batch of runs, and write the results."""
+        """Compute this thread's share of a batch: the runs whose numbers it takes from the queue.
+
+        The results are written into `results`.
+        """
         self.loops(self._buffer(), self.layout, queue, batch, settings, results)
 
     def _buffer(self) -> np.ndarray:
@@ -172,7 +175,10 @@ class Kernel:
         return self.settled_at(values, self._with_error(values, steady), runs)
 
     def _with_error(self, values: list[np.ndarray], steady: Steady) -> Steady:
-        """Add to a steady motion the error at which a controller without integral gives its force."""
+        """Add to a steady motion the error at which a controller without integral exerts its force.
+
+        The position changes by as much, the other way. With an integral the motion is returned unchanged.
+        """
         (stiffness,) = self.module.stiffness(values)
         if not np.any(steady.force) or self.having(Role.INTEGRAL) or not np.all(stiffness):
             return steady
@@ -187,9 +193,9 @@ class Kernel:
         return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
-        """Return states in a steady motion whose integrals hold only a force, `steady.force`.
+        """Return states in a steady motion whose integrals hold nothing but `steady.force`.
 
-        The other states add their own force. `values` are those of the parameters, and the shape is (runs,
+        Any force due to the other states comes on top. `values` are those of the parameters, and the shape is (runs,
         initial_size).
         """
         resting = self.settled_at(values, self._with_error(values, steady)._replace(force=0.0), runs)
@@ -205,8 +211,9 @@ class Kernel:
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
         """Return on which side of each kink runs are: 1 beyond and 0 before it, shape (kinks, ...).
 
-        At a kink derivatives jump. `full` is the full state, or the states alone, (..., ). Modes with memory are taken
-        from the full state; from states alone they are those in which a run begins.
+        At a kink derivatives jump. `full` is the full state, or the states alone, with states along the first axis.
+        `time` [s] and `reference` are those of the runs at that instant, and `values` those of the parameters. Modes
+        with memory are taken from the full state; from states alone they are those in which a run begins.
         """
         sides = self.module.surfaces(full[: len(self.states)], time, reference, values)
         modes = np.zeros((len(self.kinks), *full.shape[1:]))
@@ -219,7 +226,8 @@ class Kernel:
     def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
         """Append to initial states the modes with memory in which runs begin, if they lack them.
 
-        `starts` has the shape (runs, initial_size), or is complete already.
+        `starts` has the shape (runs, initial_size), or is complete already. `reference` holds the references at the
+        start, and `values` the parameters.
         """
         if starts.shape[1] == len(self.full_state):
             return starts
@@ -245,7 +253,8 @@ class Kernel:
 class KernelRequest:
     """Request for a kernel: a structure, the solver's method, and how many runs to do at once.
 
-    With `variational`, small deviations from a run are integrated too; they may also be `along` keys of the stage file.
+    With `variational`, small deviations from a run are integrated too. Deviations of the keys `along` (names in the
+    stage file) then lead to deviations of the run.
     """
 
     structure: KernelForm

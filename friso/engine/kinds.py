@@ -83,7 +83,10 @@ INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
 def argument_kind(example: Any) -> CompiledKind:
-    """Return the kind of an argument. Raises TypeError if compiled loops do not take it."""
+    """Return the kind of an argument, from an example of it.
+
+    Raises TypeError if compiled loops take no such argument.
+    """
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
     names = getattr(example, "_fields", None)

@@ -35,9 +35,9 @@ def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
 
 
 def load_object(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
-    """Load an object file, and return the addresses of the named functions.
+    """Load an object file, `code`, and return the addresses of the named functions.
 
-    It stays loaded until the process ends. Raises RuntimeError if it cannot be linked.
+    The code stays loaded until the process ends. Raises RuntimeError if it cannot be linked.
     """
     library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
     for function in functions:

@@ -130,7 +130,8 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
     """Return the source of a NumPy function with this head, which returns the expressions.
 
-    A case distinction (`Piecewise`) that occurs in several expressions is evaluated once.
+    `names` maps symbols to their names in the code. A case distinction (`Piecewise`) that occurs in several expressions
+    is evaluated once.
     """
     expressions = [sp.sympify(e) for e in expressions]
     cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)

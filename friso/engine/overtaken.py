@@ -27,14 +27,14 @@ ASKER: ContextVar[object] = ContextVar("asker", default=None)
 
 
 def current_flag() -> np.ndarray:
-    """Return the flag that cancels runs: the one given to `ended_by`, or an unset one."""
+    """Return the flag that cancels runs, (1,): the one given to `ended_by`, or an unset one."""
     flag = _FLAG.get()
     return np.zeros(1, np.int64) if flag is None else flag
 
 
 @contextmanager
 def ended_by(flag: np.ndarray) -> Iterator[None]:
-    """Let all runs within the block end once another thread sets ``flag[0] = 1``.
+    """Let all runs within the `with` block end once another thread sets ``flag[0] = 1``.
 
     `flag` is of int64 and of shape (1,).
     """
@@ -68,7 +68,7 @@ _turn = Condition()
 
 @contextmanager
 def going_first() -> Iterator[None]:
-    """Give priority to runs within the block: other work waits at its next batch of runs."""
+    """Give priority to runs within the `with` block: other work waits at its next batch of runs."""
     token, own = _FIRST.set(True), object()
     with _turn:
         _ahead[own] = time.monotonic() + AHEAD

@@ -20,8 +20,8 @@ def cubic(p0, p1, p2, p3, theta):
 def bracket(p0, p1, p2, p3):
     """Bracket the first zero of a cubic: return the ends of an interval and the cubic there.
 
-    The cubic is evaluated at the thirds, at the end, and at its minimum. The upper end is 2 if it is nowhere below
-    zero.
+    p0 to p3 are the values of the cubic at 0, 1/3, 2/3 and 1. It is evaluated there and at its minimum. The upper end
+    is 2 if the cubic is nowhere below zero.
     """
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3

@@ -64,8 +64,8 @@ def take_next(queue: Any) -> Any:
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
     """Call a function at an `address`, compiled for several runs at once; return a bit for each.
 
-    `friso.engine.vector_code` compiled it, such as the step. A bit is set if the function returned true for that run.
-    In Python that is not compiled, raises NotImplementedError.
+    `friso.engine.vector_code` compiled it, such as the step. It takes the `buffer` of the runs and some numbers. A bit
+    is set if the function returned true for that run. In Python that is not compiled, raises NotImplementedError.
     """
     raise NotImplementedError
 
@@ -159,7 +159,10 @@ class _Writer:
     def _write(
         self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
-        """Write a function as LLVM code, for arguments of the given types."""
+        """Write a function as LLVM code, for arguments of the given types.
+
+        Returns the LLVM function, and the type of its result (None: it returns nothing).
+        """
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
@@ -566,9 +569,9 @@ class _Frame(ast.NodeVisitor):
         return _Value(self._builder.call(code, [buffer.data, *operands]), INT)
 
     def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
-        """Convert two numbers to one type: float64 if either is.
+        """Convert two numbers to one type: float64 if either is, else whole numbers or truth values.
 
-        Returns both, and the type.
+        They become truth values only if both are. Returns both, and the type.
         """
         first, second = self._number(left), self._number(right)
         kind = FLOAT if FLOAT in (first.kind, second.kind) else INT

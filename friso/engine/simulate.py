@@ -57,9 +57,9 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
 
 
 def checked_interval(interval: float, duration: float) -> float:
-    """Return the interval between samples [s].
+    """Return the interval between samples [s] if a run of this duration [s] can have it.
 
-    Raises InputError if a run would have too many of them, or none.
+    Raises InputError if the run would have too many samples, or none.
     """
     if not duration / MOST_SAMPLES <= interval <= duration:
         text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"

@@ -187,7 +187,7 @@ class StepWriter:
     def source(self) -> str:
         """Write the function `step(B, rtol, inner, outer, budget)` for one run.
 
-        It returns true if something happened in the step that the loops around it must record.
+        The function returns true if something happened in the step that the loops around it must record.
         """
         body = [
             *self._load(),
@@ -212,10 +212,10 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """Write the function `locate(B)` for one run; nothing for a model without a clock.
+        """Write the function `locate(B)` for one run; "" for a model without a clock.
 
-        It finds out whether a table cell has been `left`, and whether a sample is to be `noted`, if the drive has
-        `ticked`. It returns true for either.
+        The function sets the flag `left` if the run has left a table cell, and the flag `noted` if a sample is to be
+        noted, because the drive has `ticked`. It returns true for either.
         """
         if not self.model.clock:
             return ""
@@ -242,8 +242,8 @@ class StepWriter:
     def update_source(self) -> str:
         """Write the function `update(B)` for one run.
 
-        It looks up tables and, if the drive has `ticked`, sets the held numbers from the last sample, and the time of
-        the next tick. Modes with memory stay as at the beginning of the step.
+        The function looks up tables and, if the drive has `ticked`, sets the held numbers from the last sample, and the
+        time of the next tick. Modes with memory stay as at the beginning of the step.
         """
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
@@ -269,7 +269,7 @@ class StepWriter:
     def _piece_of_sample(self) -> list[str]:
         """Write the code that finds the piece of the reference in which the sample was taken.
 
-        It is the previous piece if a corner came in between.
+        The piece is the previous one if a corner came in between.
         """
         length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
         lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
@@ -277,7 +277,10 @@ class StepWriter:
         return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
 
     def _in_buffer(self) -> Rename:
-        """Return the names in the code for what a sample depends on, most of it in the buffer."""
+        """Return a function that gives the name in the code of a symbol on which a sample depends.
+
+        Most of these names are places in the buffer.
+        """
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
         names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
@@ -394,8 +397,8 @@ class StepWriter:
     def _crossings(self) -> list[str]:
         """Write the search for the first crossing of a kink (where derivatives jump) in the step.
 
-        It is at the fraction `fraction` of the step, 1 if there is none. `astray` is true if a run is on the other side
-        of a kink than its mode says.
+        The code sets `fraction` to the fraction of the step at which it lies, or 1 if there is none. It sets `astray`
+        to true if a run is on the other side of a kink than its mode says.
         """
         lines = []
         for point, theta in enumerate(THIRDS):
@@ -541,7 +544,7 @@ class StepWriter:
         ]
 
     def _seen(self) -> list[str]:
-        """Write the drive's measurement at the instant of its sample, which may lie inside the step."""
+        """Write the code that stores what the drive measures at its sample, maybe inside the step."""
         clock = self.model.clock
         if not clock:
             return []

@@ -36,10 +36,10 @@ CACHE_LINE = 64
 def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
     """Compile functions to LLVM code under given names, for `lanes` runs at once.
 
-    An original `(B, *numbers)` works on a column of numbers B[row]. The compiled function does so for every run in a
-    flat float64 buffer. There the numbers of all runs, one in each lane, lie side by side in a row. The `numbers` are
-    common to all runs. It takes the buffer's address and the numbers, and returns a whole number. Bit k is set if the
-    original would return true for lane k.
+    An original function, with the arguments `(B, *numbers)`, works on a column of numbers B[row]. The compiled function
+    does so for every run in a flat float64 buffer. There the numbers of all runs, one in each lane, lie side by side in
+    a row. The compiled function takes the buffer's address and the numbers, which are common to all runs. It returns a
+    whole number, whose bit k is set if the original would return true for lane k.
     """
     module = ir.Module()
     for name, function in functions.items():
@@ -179,12 +179,12 @@ class _Writer:
         return _Vector(self.builder.fcmp_ordered(sign, *values, flags=FASTMATH), _TRUTH)
 
     def select(self, condition: Any, chosen: Any, otherwise: Any) -> _Vector:
-        """Return one of two computed values, chosen without a branch."""
+        """Return `chosen` where the condition is true, else `otherwise`, in each lane; no branch."""
         values, kind = self.together(chosen, otherwise)
         return _Vector(self.builder.select(self.truth(condition).value, *values), kind)
 
     def truth(self, value: Any) -> _Vector:
-        """Return whether a number is not 0, as in Python."""
+        """Return in each lane whether a number is not 0, as in Python."""
         if isinstance(value, _Vector) and value.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
             return _Vector(self.builder.fcmp_unordered("!=", value.value, zero, flags=FASTMATH), _TRUTH)
@@ -203,7 +203,7 @@ class _Writer:
         return self._library("sqrt", value)
 
     def _library(self, name: str, value: Any) -> _Vector:
-        """Return the result of one of LLVM's own functions of a number."""
+        """Return the result of LLVM's own function `name` of a number, in each lane."""
         vector = self._type(_FLOAT)
         signature = ir.FunctionType(vector, [vector])
         called = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.lanes}f64", (), signature)

@@ -112,7 +112,8 @@ def as_built(form: AsBuilt) -> Model:
 def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
     """Return a kink, where derivatives jump, with friction levels that vary along the rail.
 
-    The levels without the rail's factors decide on which side of the kink a run begins.
+    `varied` maps the symbols of these levels to their values on the rail. The levels without the rail's factors decide
+    on which side of the kink a run begins.
     """
     from friso.equations.component import Kink, Switch
 
@@ -125,7 +126,7 @@ def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
 
 
 def _shaken(part: Any) -> sp.Expr:
-    """Return the derivative of a state in a frame that moves with the floor.
+    """Return the derivative of a state, `part`, in a frame that moves with the floor.
 
     Only velocities change: the floor's acceleration is subtracted.
     """
@@ -135,7 +136,7 @@ def _shaken(part: Any) -> sp.Expr:
 
 
 def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
-    """Return the force of the cables on the stage [N]."""
+    """Return the force of the cables on the stage [N], from its position and velocity."""
     from friso.equations.component import key
 
     return -key("cable.stiffness") * position - key("cable.drag") * velocity
@@ -176,7 +177,7 @@ def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
     """Return the encoder's reading [m], the commanded force [N], and numbers the drive keeps.
 
-    These numbers are kept from one sample to the next.
+    `loop` has what is measured at the sample. The numbers are kept from one sample to the next.
     """
     from dataclasses import replace
 

@@ -129,7 +129,7 @@ class Measured:
 
 
 def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
-    """Make signals of a controller's inputs, scaled by a length [m] and a rate [1/s]."""
+    """Make signals of a controller's inputs, `loop`, scaled by a length [m] and a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
@@ -163,7 +163,7 @@ class Blocks(ABC):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Mark the blocks made within as parts of the "position" or the "velocity" loop.
+        """Mark blocks that are made in this context as parts of the "position" or "velocity" loop.
 
         A drive may run the position loop at a lower rate.
         """
@@ -172,7 +172,7 @@ class Blocks(ABC):
     def handed_on(self, signal: Signal, name: str) -> Signal:
         """Pass a signal from a slower loop to a faster one, which holds it between slow samples.
 
-        Without sample times the signal is unchanged.
+        `name` names the held value. Without sample times the signal is unchanged.
         """
         return signal
 
@@ -236,7 +236,7 @@ class Blocks(ABC):
 
     @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
-        """Return the force with the gains for standstill while the error is small.
+        """Return the force, with the gains for standstill while the error is within their window.
 
         `total` is the force with the usual gains. The integrals keep the force that they had.
         """
@@ -245,7 +245,7 @@ class Blocks(ABC):
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return a constant force towards the reference, which acts while the reference rests.
 
-        It acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
+        The force acts only if the error is not small. `direction` is that of the reference: 1, -1 or 0.
         """
 
     @abstractmethod
@@ -257,7 +257,7 @@ class Blocks(ABC):
         return self._filtered(signal, FEEDBACK)
 
     def fed_forward(self, signal: Signal) -> Signal:
-        """Return a demanded force behind the filters of the forward path."""
+        """Return a demanded force, `signal`, behind the filters of the forward path."""
         return self._filtered(signal, FORWARD)
 
     def _filtered(self, signal: Signal, path: str) -> Signal:
@@ -316,7 +316,7 @@ class Demand:
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
-    """Return the force that a controller demands for its measured inputs."""
+    """Return the force that a controller demands for the measured inputs `seen`."""
     error, settings = seen.error, form.settings
     if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)
@@ -347,11 +347,11 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """Return the states of integrators in a steady motion in which the controller gives a force.
+    """Return the states of integrators in a steady motion with some force of the controller.
 
-    That force is `force` of `STEADY`. The innermost integral, the last of `integrals`, supplies it; the others are 0.
-    The argument `force` is the controller's own force in the steady motion, in terms of the integrals. The result is
-    empty without integrals.
+    That force is the symbol `STEADY.force`; the innermost integral, the last of `integrals`, supplies what is missing,
+    and the others are 0. The argument `force` is what the controller computes in the steady motion, in terms of the
+    integrals. The result maps integrals to states, and is empty without integrals.
     """
     if not integrals:
         return {}

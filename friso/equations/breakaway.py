@@ -51,7 +51,7 @@ def least_breakaway(flat: Mapping[str, Any]) -> Any:
 def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the keys for the guide's friction law, and for the motor's under the guide's names.
 
-    The second is left out if there is no friction at the motor.
+    The list has one entry if there is no friction at the motor.
     """
     at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
     return [flat, *at_motor]

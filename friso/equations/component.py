@@ -73,8 +73,9 @@ class Clock:
     """The instants at which a drive samples, every `period` [s], and what it looks up there.
 
     Results of a sample take effect `late` [s] after it, less than a period; then the held numbers change. `seen` are
-    states measured at the sample itself, under separate names. `places` are tables looked up by the position in a
-    state, and `times` are tables looked up by the time of the sample. Looked-up values are held between samples too.
+    states measured at the sample itself, under separate names. `places` maps symbols of looked-up values to the
+    position at which their table is read. `times` are symbols of values read from tables over time. Looked-up values
+    are held between samples too.
     """
 
     period: sp.Expr
@@ -104,7 +105,7 @@ class sine(sp.Function):
     nargs = 1
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Return the derivative, 2 pi cos(2 pi x)."""
+        """Return the derivative by the number of turns x: 2 pi cos(2 pi x)."""
         return 2 * sp.pi * sine(self.args[0] + sp.Rational(1, 4))
 
 

@@ -1,9 +1,9 @@
 """Apply the operating conditions of a machine to static and Coulomb friction of its guide.
 
-They multiply both for every friction law. Friction consists of a constant part (seals, preload) and a part that grows
-with the normal force. It is larger in the cold: Carvalho Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A running
-machine warms up exponentially in time: Simoni, Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. For the
-variation of friction along a rail, see `friso.equations.rail`.
+Conditions multiply both levels alike, for every friction law. Friction consists of a constant part (seals, preload) and
+a part that grows with the normal force. It is larger in the cold: Carvalho Bittencourt, Gunnarsson 2012,
+doi:10.1115/1.4006589. A running machine warms up exponentially in time: Simoni, Beschi, Legnani, Visioli 2019,
+doi:10.1017/S0263574717000509. For the variation of friction along a rail, see `friso.equations.rail`.
 """
 
 from __future__ import annotations

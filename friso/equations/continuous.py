@@ -34,7 +34,10 @@ continuous, and the motion along the limit is ordinary, if stiff."""
 
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
-    """Return a controller in continuous time; `length` [m] and `rate` [1/s] scale its states."""
+    """Return a controller in continuous time, which acts on the inputs `loop`.
+
+    `length` [m] and `rate` [1/s] scale its states.
+    """
     blocks = Continuous(rate, form)
     demand = demanded(form, loop_signals(loop, length, rate), blocks)
     bound = ForceLimit.of(demand.force, form.anti_windup) if form.anti_windup else None
@@ -100,7 +103,7 @@ class ForceLimit:
 
     @classmethod
     def of(cls, demand: Signal, anti_windup: AntiWindup) -> ForceLimit:
-        """Make the force limit for a demand."""
+        """Make the force limit for a demanded force; integrators there follow `anti_windup`."""
         limit = force_limit()
         force, kinks = _clamped(demand.value, limit, "force")
         return cls(limit, force, kinks, force - demand.value, anti_windup)
@@ -139,7 +142,7 @@ class Continuous(Blocks):
 
     @property
     def integrands(self) -> dict[sp.Symbol, sp.Expr]:
-        """Return the inputs of the integrators in a steady motion."""
+        """Return the inputs of the integrators in a steady motion, by the symbols of their states."""
         return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
@@ -250,7 +253,8 @@ class Continuous(Blocks):
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference while the error exceeds the window.
 
-        It acts while the reference rests. Each end of the window is a kink, where derivatives jump.
+        It acts while the reference rests, that is while its `direction` is 0. Each end of the window is a kink, where
+        derivatives jump.
         """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
@@ -278,9 +282,9 @@ class Continuous(Blocks):
         return 1 - pauses.beyond, (pauses,)
 
     def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
-        """Return a mode with memory for the sign of the error, where integrals restart at a change.
+        """Return a mode with memory for the sign of the error, at whose change integrals restart.
 
-        They restart at 0. There is no mode if no integral restarts.
+        They restart at 0. The result is empty if no integral restarts.
         """
         empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
         return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
@@ -325,7 +329,10 @@ class Continuous(Blocks):
         return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
 
     def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
-        """Return the outputs of an integral that have a limit, with the limit and its name."""
+        """Return the limits of an integral, each as expression, limit and name; empty without any.
+
+        An integral may have a limit of its output, and one of its part of the demanded force.
+        """
         limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
         if self.settings.limit:
             force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
@@ -351,10 +358,10 @@ def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...
 
 
 def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
-    """Return how far a limit stops an integrator: 0 if it runs, 1 if it is stopped.
+    """Return how far a limit stops an integrator: from 0 if it runs to 1 if it is stopped.
 
-    The limit stops it where the value is beyond one of the `limits` and would be driven further. Beyond `far` it has
-    stopped altogether. `winding` tells in which direction it is driven.
+    The limit stops it where the value is beyond one of the `limits` and would be driven further, gradually until it is
+    beyond `far`. `winding` tells in which direction it is driven.
     """
     band, rest = UNWINDING_BAND * limit, sp.S.Zero
     for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):

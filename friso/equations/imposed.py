@@ -91,7 +91,7 @@ def imposed(form: Imposed) -> Model:
 
 
 def _per_period(inner: State, period: sp.Expr) -> State:
-    """Return a state of the law with its derivative per period instead of per second.
+    """Return a state of the law, `inner`, with its derivative per period instead of per second.
 
     States that are lengths get the size of the motion as their scale, if it is smaller.
     """

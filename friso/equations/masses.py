@@ -39,8 +39,8 @@ class Body:
 def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
     """Return the force of the stage on the parasitic mass [N], by a spring and a damper.
 
-    They represent the joint's first internal mode. `parasitic.frequency` is the frequency at which the two parts of the
-    stage oscillate against each other (design.md, section 1).
+    Spring and damper represent the joint's first internal mode. `parasitic.frequency` is the frequency at which the two
+    parts of the stage oscillate against each other (design.md, section 1).
     """
     reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
     omega = 2 * sp.pi * key("parasitic.frequency")

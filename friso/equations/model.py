@@ -47,8 +47,9 @@ class Model:
 
     - `deviation` [m]: position minus reference.
     - `length` [m] and `rate` [1/s]: scales of the motion, from which the solver takes its absolute tolerances.
-    - `breakaway` [N]: largest friction force at rest; `steady` [N]: friction in a steady motion, None where the law
-      lacks it.
+    - `breakaway` [N]: largest force of the controller at which nothing moves: friction at rest, and with a backlash the
+      force at half of it.
+    - `steady` [N]: friction in a steady motion, None where the law lacks it.
     - `stiffness` [N/m]: proportional stiffness of the loop.
     - `jumps`: for each kink, the jumps of states where it is crossed, as expressions of the values just before.
     - `inputs`: values that are new at every corner of the reference, in this order; `reference`: what its pieces
@@ -252,7 +253,7 @@ def _bodies(structure: Structure) -> Bodies:
 def _positions(structure: Structure, chain: Bodies) -> list[Component]:
     """Return position and velocity of the stage as outputs.
 
-    With a transmission, the outputs of the measured side come first.
+    With a transmission, the outputs of the side whose position is measured come first, then those of the other side.
     """
     if not (structure.transmission and chain.motor):
         return [position_outputs("", "stage", chain.stage)]
@@ -263,7 +264,7 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
-    """Return the friction law at the motor in terms of the motor's velocity, if there is one."""
+    """Return the friction law at the motor, by the motor's velocity; None without such friction."""
     form = structure.transmission
     if form is None or chain.motor is None:
         return None
@@ -284,7 +285,7 @@ def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
 def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
     """Return friction [N] at guide and motor while all masses move with the cart.
 
-    It is None if a law does not determine it.
+    Returns None if a law does not determine it.
     """
     total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
     if motor_friction and chain.motor and total is not None:
@@ -298,8 +299,8 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
 
     The length is the deflection of the loop by the break-away force, or about the motion itself if that is shorter. The
     rate is the natural frequency of mass and loop, but at least one over the duration of the motion. A hunting cycle is
-    a few of each in size and period. Without friction the length is that of the motion, or else the deflection by the
-    forces of [bias].
+    a few lengths wide and takes a few times 1/rate. Without friction the length is that of the motion, or else the
+    deflection by the forces of [bias].
     """
     stiffness = loop_stiffness(structure.controller)
     if breakaway == 0:
@@ -321,7 +322,8 @@ def _mechanics(
 ) -> tuple[list[State], list[Component]]:
     """Return the states of every body by Newton's law, and the parts that supply the forces.
 
-    `frictions` act on the cart and at the motor. `scales` are the length [m] and the rate [1/s] of the states.
+    `frictions` act on the cart and at the motor; `forces` are those of the actuator and of external causes. `scales`
+    are the length [m] and the rate [1/s] of the states.
     """
     cart, stage, parasitic, motor = chain.cart, chain.stage, chain.parasitic, chain.motor
     friction, motor_friction = frictions

@@ -25,7 +25,7 @@ def varies(flat: Mapping[str, Any]) -> bool:
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Return the pieces of the reference of each run, shape (runs, pieces, 1 + inputs).
 
-    See `friso.equations.reference`.
+    A piece is a row of its start [s] and of the inputs of the equations (see `friso.equations.reference`).
     """
     kind = motion_of(flat)
     form, rows, tones = kind.form(flat), kind.pieces(flat), kind.tones(flat)
@@ -39,7 +39,8 @@ def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
 def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], duration: Any) -> np.ndarray:
     """Return pieces of the reference with sinusoids added, cut also where it reverses.
 
-    `rows` has the shape (runs, pieces, 1 + inputs), and `duration` [s] is that of the runs.
+    `rows` are the pieces without sinusoids, shape (runs, pieces, 1 + inputs); `tones` are the sinusoids, and `duration`
+    [s] is that of the runs.
     """
     ends = np.broadcast_to(np.asarray(duration, dtype=float), (len(rows),))
     for number, tone in enumerate(tones):
@@ -53,7 +54,8 @@ def _with_tones(form: ReferenceForm, rows: np.ndarray, tones: Sequence[Tone], du
 def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     """Return the pieces of one run's reference with sinusoids, cut also where it reverses.
 
-    `rows` are pieces up to the time `end` [s], whose sinusoids have their phases at time 0.
+    `rows`, shape (pieces, 1 + inputs), are pieces up to the time `end` [s], whose sinusoids have their phases at time
+    0. The result has as many columns.
     """
     starts, first, per_period = rows[:, 0], form.degree + 3, MotionSettings.current().samples_per_period
     tones = rows[0, first:].reshape(-1, 4)
@@ -62,7 +64,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
     bare[:, first:] = 0.0
 
     def rate(time: np.ndarray) -> np.ndarray:
-        """Return the velocity of the reference at times of the run [m/s]."""
+        """Return the velocity of the reference [m/s] at times of the run [s], both of shape (n,)."""
         piece = bare[np.searchsorted(starts, time, side="right") - 1]
         of_tones = np.concatenate([np.zeros((1, first)), rows[:1, first:]], axis=1)
         return value(form, piece, time - piece[:, 0], 1) + value(form, of_tones, time, 1)
@@ -86,7 +88,7 @@ def _turning(form: ReferenceForm, rows: np.ndarray, end: float) -> np.ndarray:
 
 
 def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
-    """Return the reference position [m] of one run at the times [s]."""
+    """Return the reference position [m] of one run at times [s], both of shape (n,)."""
     rows = pieces(flat, 1)[0]
     row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
     return value(form_of(flat), row, time - row[:, 0])
@@ -113,7 +115,7 @@ def stands(flat: Mapping[str, Any]) -> Sequence[Stand]:
 def rests(flat: Mapping[str, Any]) -> bool:
     """Tell whether the reference stands still in the end, so that a stage can hunt.
 
-    `flat` has the keys of stages; all of them must.
+    `flat` has the keys of one stage or several; the result is true if that holds for all of them.
     """
     return motion_of(flat).rests or _ends_without(1, flat)
 
@@ -161,8 +163,9 @@ def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
 def standing(flat: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a stage whose reference stands still from the start.
 
-    It stands where the reference of the stage's own motion ends. Magnitudes remain those of that motion, or of a step
-    to its end. A motion whose reference has a single piece is returned unchanged, even if that piece moves.
+    It stands where the reference of the stage's own motion ends. The new motion is a step to that place. If the place
+    is 0, it is a release over the length of the old motion, which sets the scales of the equations. A motion whose
+    reference has a single piece is returned unchanged, even if that piece moves.
     """
     rows = motion_of(flat).pieces(flat)
     if len(rows) == 1:

@@ -73,8 +73,8 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
 def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
     """Return standard normal numbers for `count` cells of the rail, from number `first` on.
 
-    The numbers are independent, and each is a function of the cell's number and the seed alone. Raises InputError for
-    too many cells.
+    The numbers are independent, and each is a function of the cell's number and the seed alone. The shape is (count,).
+    Raises InputError for too many cells; the message names a sufficient correlation `length` [m].
     """
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS
@@ -86,7 +86,10 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
 
 
 def _rolling(rail: Mapping[str, Any], places: np.ndarray, seed: int) -> np.ndarray | float:
-    """Return the factor on friction at places [m] that is due to the rolling elements."""
+    """Return the factor on friction at places [m] that is due to the rolling elements, (n,).
+
+    `rail` has the keys of the rail; without a pitch of rolling elements, the result is the number 1.
+    """
     if "rolling_pitch" not in rail:
         return 1.0
     phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(HARMONICS))

@@ -87,9 +87,10 @@ def value(form: ReferenceForm, rows: np.ndarray, elapsed: Any, order: int = 0) -
 
 
 def moved_on(form: ReferenceForm, rows: np.ndarray, elapsed: Any) -> np.ndarray:
-    """Return pieces of the reference that start a time [s] later and take the same course.
+    """Return pieces of the reference that start a time `elapsed` [s] later and go on as before.
 
-    Polynomials are expanded about the new start, and sinusoids get the phase and frequency that they have there.
+    Pieces and result have the shape of `rows`. Polynomials are expanded about the new start, and sinusoids get the
+    phase and frequency that they have there.
     """
     later = rows.copy()
     later[..., 0] += elapsed

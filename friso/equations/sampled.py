@@ -43,7 +43,7 @@ def counter(loop: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class Rest:
-    """Conditions under which integrators pause (`rests`) or restart at a sample.
+    """Conditions at a sample under which integrators pause (`rests`) or restart (`restarts`).
 
     The force limit is not among them.
     """
@@ -73,10 +73,11 @@ def sampled_controller(
 
 @dataclass(frozen=True)
 class _Integral:
-    """An integrator of a drive: its number, its next value, and its increment per sample.
+    """An integrator of a drive: the symbols of its number and of the number's next value.
 
-    The increment is `share`. There is a gain, a limit of the output, a leak, and the period of its loop. `due` is the
-    condition for the loop to run (None: at every sample).
+    `share` is the increment of the number per sample; the output is the number times `gain`, at most `limit`. `leak`
+    [1/s] is its leak, and `period` [s] that of its loop. `due` is the condition for the loop to run (None: at every
+    sample).
     """
 
     symbol: sp.Symbol
@@ -118,7 +119,10 @@ class DiscreteRate:
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:
-        """Return the ratio of the substitute to s at low frequencies; 1 unless it is prewarped."""
+        """Return the ratio of the substitute to s at low frequencies; 1 unless it is prewarped.
+
+        `period` [s] is the sample time.
+        """
         return 2 * period / (self.step * (1 + self.weight))
 
     def polynomial(self, polynomial: Polynomial) -> Polynomial:
@@ -142,7 +146,10 @@ class Sampled(Blocks):
 
     @contextmanager
     def loop(self, name: str) -> Iterator[None]:
-        """Mark blocks as parts of a loop; their numbers change only at samples at which it runs."""
+        """Mark blocks made in this context as parts of the loop `name`.
+
+        Their numbers change only at samples at which that loop runs.
+        """
         if self.form is None or name not in self.form.loops:
             yield
             return
@@ -242,8 +249,8 @@ class Sampled(Blocks):
     ) -> Signal:
         """Return a signal behind a second-order transfer function, computed at every sample.
 
-        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator. They are discretised by
-        `rule`, or by the drive's own rule if it is None.
+        `upper` and `lower` are the coefficients of 1, s and s^2 of numerator and denominator. The function is
+        discretised by `rule`, or by the drive's own rule if it is None.
         """
         rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
         (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))
@@ -292,7 +299,7 @@ class Sampled(Blocks):
     def push(self, error: Signal, direction: Signal) -> Signal:
         """Return the force that pushes towards the reference, by the error at a sample.
 
-        It acts while the reference rests.
+        It acts while the reference rests, that is while its `direction` is 0.
         """
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
@@ -301,7 +308,10 @@ class Sampled(Blocks):
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
     def dither(self) -> Signal:
-        """Return the dither force at a sample; the number of turns is held and counted on."""
+        """Return the dither force at a sample.
+
+        Its number of turns is a held number, which grows at each sample.
+        """
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         turn = state("dither_turn")
         following = turn + frequency * SAMPLE_TIME
@@ -330,6 +340,7 @@ class Sampled(Blocks):
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """Return the force before its limit, and all held numbers.
 
+        `demand` is what the controller asks for, and `rest` has conditions under which integrators pause or restart.
         Integrators follow the anti-windup where the force would exceed its limit. They stop where their output would
         exceed a limit of its own.
         """

@@ -17,7 +17,7 @@ TABLES = ("friction", MOTOR_FRICTION)
 def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of static friction, each with its key of Coulomb friction.
 
-    The result is empty for a law that does not have both.
+    The result is empty for a law without static or Coulomb friction.
     """
     pairs = {f"{table}.static": f"{table}.coulomb" for table in TABLES}
     return {static: coulomb for static, coulomb in pairs.items() if static in flat and coulomb in flat}
@@ -26,7 +26,7 @@ def static_frictions(flat: Mapping[str, Any]) -> dict[str, str]:
 def least_static_factor(flat: Mapping[str, Any]) -> float:
     """Return the smallest factor on static friction for which it is at least Coulomb friction.
 
-    The stages, given by keys in SI, must have a law with both.
+    The stages, given by keys in SI, must have a law with static and Coulomb friction.
     """
     return max(float(np.max(flat[coulomb] / flat[static])) for static, coulomb in static_frictions(flat).items())
 
@@ -34,7 +34,7 @@ def least_static_factor(flat: Mapping[str, Any]) -> float:
 def with_static_friction(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     """Return stages with static friction times a factor, Coulomb friction unchanged.
 
-    `flat` has the stages' keys in SI. A law that does not have both stays as it is.
+    `flat` has the stages' keys in SI. A law without static or Coulomb friction stays as it is.
     """
     return {**flat, **{key: flat[key] * factor for key in static_frictions(flat)}}
 

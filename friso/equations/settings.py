@@ -1,8 +1,8 @@
 """Catalogue of a drive's settings against friction.
 
-It lists the effect of each, its values for a machine, and its ranges. Their keys are declared in
-`friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare --also` tries one value of each
-setting; `friso tune` searches their ranges.
+The catalogue lists the effect of each setting, its values for a machine, and the ranges in which it is tuned. The keys
+of settings are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
+--also` tries one value of each setting; `friso tune` searches their ranges.
 """
 
 from __future__ import annotations

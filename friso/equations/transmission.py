@@ -1,8 +1,8 @@
 """Screw, belt or gear between motor and load: a spring and damper with backlash.
 
-Both are idle while the backlash is crossed. The motor is a body of its own, its mass and motion taken at the load: one
-turn of the motor moves the load by a lead. Friction at the motor is a friction law of its own, of the table
-[motor_friction].
+Spring and damper are idle while the backlash is crossed. The motor is a body of its own, its mass and motion taken at
+the load: one turn of the motor moves the load by a lead. Friction at the motor is a friction law of its own, of the
+table [motor_friction].
 """
 
 from __future__ import annotations

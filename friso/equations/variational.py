@@ -65,10 +65,10 @@ def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
 
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations at a kink, where derivatives jump, by deviation.
+    """Return the jump of deviations at a kink, where derivatives jump, by symbol of deviation.
 
     It is (f+ - f-) times the component of the deviation across the kink, divided by the speed of crossing. f- and f+
-    are the right-hand sides just before and just after the crossing.
+    are the right-hand sides just before and just after the crossing. `small` maps symbols to those of their deviations.
     """
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
@@ -84,11 +84,11 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
 
 
 def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
-    """Return the jump of deviations, by deviation, where states x become R(x).
+    """Return the jump of deviations where a `switch` changes and states x become R(x).
 
-    That happens at a kink, where derivatives jump as well. The jump is DR small + (f+ - DR f-) share - small. f- and f+
-    are the right-hand sides just before and just after the crossing, f+ at R(x). `share` is the time by which the
-    neighbouring motion crosses earlier or later.
+    The result is by symbol of deviation. Derivatives jump as well there. The jump is DR small + (f+ - DR f-) share -
+    small. f- and f+ are the right-hand sides just before and just after the crossing, f+ at R(x). `share` is the time
+    by which the neighbouring motion crosses earlier or later.
     """
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
@@ -107,8 +107,8 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
     """Tell whether a difference is zero everywhere on a kink's surface, where derivatives jump.
 
-    It is tested at some points. The result is false if the surface is linear in no symbol, as at the end of a window.
-    It is also false if the surface has no slope at one of the points.
+    `gap` is the difference, an expression, tested at some points. The result is false if the surface is linear in no
+    symbol, as at the end of a window. It is also false if the surface has no slope at one of the points.
     """
     if gap == 0:
         return True

@@ -118,7 +118,7 @@ class Bode:
     def settled(self) -> tuple[Members, Margins]:
         """Return the worst of the states in which a stage may settle, with its margins.
 
-        They are the limit cases, and the states stuck under any bias force.
+        A stage may settle in the limit cases, and in the states stuck under any bias force.
         """
         return self._with_margins(self.scan.worst(self.scan.members.settled))
 
@@ -198,7 +198,10 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
 
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
-    """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage."""
+    """Return a range of frequencies [Hz] that shows all crossovers and resonances of a stage.
+
+    The crossovers are those of `all_margins`.
+    """
     settings = FrequencySettings.current()
     poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)

@@ -100,8 +100,8 @@ def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
 def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     """Return the range of crossovers [Hz] that is searched.
 
-    It ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a range of
-    factors of its bandwidth.
+    The range ends below half the sampling frequency of a drive. For a controller that states no crossover, it is a
+    range of factors of its bandwidth.
     """
     settings = FrequencySettings.current()
     drive = DriveTiming.of(flat)
@@ -154,9 +154,10 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """A search over crossovers of a stage's controller, in all states in which it may settle.
+    """Search over crossovers of a stage's controller, in all states in which it may settle.
 
-    `members` are these states. Parts that do not depend on the crossover are computed once.
+    `flat` has the stage's keys in SI, and `members` are these states. Parts that do not depend on the crossover are
+    computed once.
     """
 
     flat: Mapping[str, Any]
@@ -191,8 +192,8 @@ class _Search:
     def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
         """Return frequencies [rad/s] that resolve the loop at all crossovers, and a loop function.
 
-        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. These do
-        not depend on the crossover, so that the distance from -1 is a smooth function of it.
+        The function takes the keys of a stage with any controller, and returns its loops at the frequencies. The
+        frequencies do not depend on the crossover, so that the distance from -1 is a smooth function of it.
         """
         settings = FrequencySettings.current()
         grids = [frequency_grid(_at(self.flat, np.array(end)), settings.search_density) for end in self.ends]

@@ -76,9 +76,9 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """Return the frequency response of hold, delay and current loop at frequencies [rad/s].
+        """Return the frequency response of hold, delay and current loop, in the shape of `omega`.
 
-        Aliases are left out.
+        Frequencies are in [rad/s]. Aliases are left out.
         """
         half = omega * self.sample_time / 2
         return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
@@ -128,7 +128,7 @@ def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
 
 
 def waited(machine: System, samples: int) -> System:
-    """Return a plant with one input in discrete time whose force is delayed by some samples."""
+    """Return a plant in discrete time whose force, the one input, is delayed by some samples."""
     if not samples:
         return machine
     register = np.eye(samples, k=-1)
@@ -140,8 +140,8 @@ def waited(machine: System, samples: int) -> System:
 def delayed(machine: System, delay: float, loop: float) -> System:
     """Return a plant with one input behind a delay [s], made of rational functions (Pade).
 
-    Several of them follow one another. `loop` [rad/s] is the fastest resonance of the closed loop without delay. Raises
-    InputError if the phase of the plant's own resonances turns too far within the delay.
+    A long delay is split into several such functions. `loop` [rad/s] is the fastest resonance of the closed loop
+    without delay. Raises InputError if the phase of the plant's own resonances turns too far within the delay.
     """
     settings = FrequencySettings.current()
     turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
@@ -169,7 +169,7 @@ def fastest(poles: Complex) -> float:
 
 
 def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
-    """Return a plant with one input behind another system, given by its matrices a, b, c, d.
+    """Return a plant with one input behind the system `first`, its matrices a, b, c, d.
 
     `name` names that system's states.
     """
@@ -184,7 +184,10 @@ def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System
 
 
 def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the effect of states and of a constant force on the states after a time [s]."""
+    """Return the effect of states and of a constant force on the states after a time [s].
+
+    The shapes are (members, n, n) and (members, n, 1).
+    """
     n = len(machine.states)
     matrices = np.zeros((len(machine.a), n + 1, n + 1))
     matrices[:, :n, :n], matrices[:, :n, n:] = machine.a * time, machine.b * time

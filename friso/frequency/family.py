@@ -173,7 +173,7 @@ def distance_to_lines(loop: Complex) -> np.ndarray:
 
 
 def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
-    """Return angular frequencies [rad/s] that resolve the loops in all limit cases.
+    """Return angular frequencies [rad/s] that resolve the loops in all limit cases, (k,).
 
     There are `density` per decade, and more about the resonances of plant and closed loop.
     """
@@ -212,7 +212,8 @@ def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Comp
 def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Complex:
     """Return stage position over force [m/N] while the cart is held, shape (members, k).
 
-    The complex frequencies s (k,) are in [rad/s]. It is 0 if cart and stage are one.
+    `masses` are the masses without friction, and `s`, shape (k,), complex frequencies [rad/s]. The result is 0 if cart
+    and stage are one.
     """
     if shared_structure(flat).joint == "rigid":
         return np.zeros((len(masses.a), len(s)), complex)

@@ -96,7 +96,8 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
 def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
     """Return the friction law's internal states that bear the bias force at rest, by symbol.
 
-    All states are deflected equally from their unloaded value.
+    `rates` are the states' rates of change, and `force` is the law's force. All states are deflected by one
+    displacement of the cart from the unloaded state.
     """
     pulled = sp.Symbol("pulled", real=True)
     relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}

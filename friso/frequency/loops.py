@@ -189,7 +189,7 @@ def _driven(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Sy
 
 
 def _held(machine: System, drive: DriveTiming) -> System:
-    """Return the plant behind hold and delay, from the force to the positions one sample later."""
+    """Return a plant behind hold and delay, from the force to the positions one sample later."""
     samples, late = drive.samples_late
     return waited(zero_order_hold(machine, drive.sample_time, late), samples).take((FORCE,), (STAGE, RATED))
 
@@ -222,7 +222,10 @@ def _cut(machine: System, control: System) -> System:
 
 
 def _squared(at: Complex, pole: Complex) -> np.ndarray:
-    """Return squared distances from a pole of each member, (members, 1), without `np.abs`."""
+    """Return squared distances of points `at` from a pole of each member, (members, points).
+
+    The pole has the shape (members, 1).
+    """
     return np.asarray((at.real - pole.real) ** 2 + (at.imag - pole.imag) ** 2)
 
 

@@ -94,7 +94,7 @@ def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_
 def frequencies(
     flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
-    """Return angular frequencies [rad/s] that resolve the loops in all states of `members`.
+    """Return angular frequencies [rad/s] that resolve the loops in all states, shape (k,).
 
     There are `density` per decade, up to the highest that the drive can represent, and more about the resonances among
     the poles `resonant`.
@@ -109,7 +109,7 @@ def frequencies(
 def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
     """Return ascending angular frequencies [rad/s]: `even` ones, and more about resonances.
 
-    `resonant` are poles [rad/s], of which the lightly damped ones count.
+    `resonant` are poles [rad/s], of which the lightly damped ones count. The shape is (k,).
     """
     light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
@@ -119,7 +119,7 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
 def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
     """Return the loop at frequency 0 in a list, which is empty if it is not finite there.
 
-    It is finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
+    The loop counts as finite if it is real and constant towards 0. `slow` is a low frequency [rad/s].
     """
     settings = FrequencySettings.current()
     low, lower = at(np.array([2 * settings.rest_frequency, settings.rest_frequency]) * slow)
@@ -161,14 +161,15 @@ def _hertz(omega: np.ndarray) -> tuple[float, ...]:
 
 
 def _decades(loop: Complex) -> np.ndarray:
-    """Return the logarithm of the magnitude of a loop, which may be 0."""
+    """Return the natural logarithm of the magnitude of a loop, which may be 0, in its shape."""
     return np.log(np.maximum(np.abs(loop), np.finfo(float).tiny))
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the frequencies at which a function passes zero, from its values at `omega`.
+    """Return the frequencies [rad/s], (n,), at which a function passes zero.
 
-    Jumps, such as those of a locus that changes to an alias, do not count.
+    `values` are those of the function at `omega`. Jumps, such as those of a locus that changes to an alias, do not
+    count.
     """
     settings = FrequencySettings.current()
     with np.errstate(invalid="ignore"):

@@ -69,7 +69,7 @@ class Members:
         return replace(self, touched=np.full(len(self), touched))
 
     def repeated(self, times: int) -> Members:
-        """Return all states, repeated `times` times one after the other."""
+        """Return all states in order, and this list `times` times."""
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 

@@ -86,7 +86,7 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 def _limiter(touched: np.ndarray) -> dict[str, Any]:
     """Return the symbols that say whether the limiter is touched, by name, with their values.
 
-    It is free, or touched ahead.
+    Where `touched` is true, the limiter is touched ahead, else it is free.
     """
     ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
     return {ahead: touched.astype(float), behind: 0.0}
@@ -95,7 +95,7 @@ def _limiter(touched: np.ndarray) -> dict[str, Any]:
 def _on_flank() -> dict[str, Any]:
     """Return the symbols that say where the backlash is, by name, with their values.
 
-    It is on the flank that pulls.
+    The motor stands on the flank ahead, on which it pushes the load forward.
     """
     ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
     return {ahead: 1.0, behind: 0.0}
@@ -181,8 +181,8 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
     """Return the system with the friction law's internal states tied to the stuck cart.
 
     At rest the rate of these states is proportional to the velocity of the cart alone. So they differ from a multiple
-    of its position by a constant, which depends on where on the rail it got stuck. Nothing controls that constant, and
-    it does not matter; it would be a pole at 0.
+    of its position by a constant, which depends on where on the rail the cart got stuck. Nothing controls that
+    constant, and it does not matter; it would be a pole at 0.
     """
     position, velocity = map(system.states.index, cart)
     a, c = system.a.copy(), system.c.copy()

@@ -29,7 +29,7 @@ def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> 
 
 
 def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, ...]:
-    """Return the intersection of two lists of ranges."""
+    """Return the ranges in which both of two lists of ranges hold."""
     pairs = [(max(a[0], b[0]), min(a[1], b[1])) for a in first for b in second]
     return tuple(pair for pair in pairs if pair[0] < pair[1])
 

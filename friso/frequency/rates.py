@@ -188,7 +188,10 @@ def unseen(control: System, measured: str) -> System:
 
 
 def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:
-    """Combine a system's samples over a period: x' = step x + push u, y = answer x at each one."""
+    """Combine a system's samples over a period: x' = step x + push u, y = answer x at each one.
+
+    The lists have the matrices of each sample, in order.
+    """
     count, (members, n) = len(steps), steps[0].shape[:2]
     along = np.broadcast_to(np.eye(n), (members, n, n))
     inputs = np.zeros((members, n, count))  # from the inputs so far to the present state
@@ -203,7 +206,8 @@ def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.
 def _step(machine: System, control: System, shut: float) -> np.ndarray:
     """Return by what matrix the states of plant and controller change over a sample.
 
-    `shut` is 1 if the loop is closed, so that the controller's force acts, and 0 if it is cut.
+    The plant is `machine`, and the shape (members, n, n). `shut` is 1 if the loop is closed, so that the controller's
+    force acts, and 0 if it is cut.
     """
     n, k = machine.a.shape[-1], control.a.shape[-1]
     step = np.zeros((len(machine.a), n + k, n + k))

@@ -102,8 +102,9 @@ def _ends_closed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run stages whose attractors are closed orbits; find which runs end there.
 
-    Runs are judged early; a run that has not reached an orbit by then is continued, twice as long each time. Returns
-    which runs end there, which were completed, and the peak-to-peak swing [m], all of shape (count,).
+    Runs begin in the states `starts` (None: those of the motion), and must swing as `target` says. They are judged
+    early; a run that has not reached an orbit by then is continued, twice as long each time. Returns which runs end
+    there, which were completed, and the peak-to-peak swing [m], all of shape (count,).
     """
     settings = BasinSettings.current()
     size, lasting, early, last = (
@@ -130,7 +131,8 @@ def _ends_observed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run stages whose attractors were only observed; find which runs end there.
 
-    The tolerance is tighter than for closed orbits. Returns which runs end there, which were completed, and the
+    Runs begin in the states `starts` (None: those of the motion), and must swing half as far as `target` says. The
+    tolerance is tighter than for closed orbits. Returns which runs end there, which were completed, and the
     peak-to-peak swing [m], all of shape (count,).
     """
     settings = BasinSettings.current()
@@ -145,9 +147,10 @@ def _ends_observed(
 
 
 def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Return which runs swing as far as an observed attractor, but not within its last period.
+    """Return which runs swing as far as the observed attractor, but too seldom, (count,).
 
-    It is unknown whether such runs end in the attractor.
+    It is unknown whether such runs end in the attractor, `target`. `ends` marks runs that swing so within its last
+    period, and `swing` [m] is peak to peak over a longer time.
     """
     return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 
@@ -186,9 +189,9 @@ def _caught(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which runs end in an attractor, and for which that is certain, both (count,).
 
-    The return map decides where it is reliable, long runs elsewhere. The end is uncertain if the run then swings by
-    more than `widest`, peak to peak [m], because it may grow or decay. It is also uncertain if the run swings less
-    often than an observed attractor.
+    The return map decides where it is reliable. Elsewhere long runs decide; their end is uncertain if they swing by
+    more than `widest`, peak to peak [m], because the swing may grow or decay. The end is also uncertain if a run swings
+    less often than an observed attractor.
     """
     ends, decided = np.zeros(count, bool), np.zeros(count, bool)
     if landing_map is not None:
@@ -211,7 +214,7 @@ def displacements_that_hunt(
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Release the stage from displacements [m]; return which hunt, and which are certain."""
+        """Release the stage from displacements [m]; return which hunt, and which are certain, (n,)."""
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest, landing_map)
 
     return kick_windows(hunts, target.amplitude)
@@ -223,7 +226,7 @@ def displacements_that_run_away(stage: Stage) -> Kick:
     end = BasinSettings.current().runaway_periods * float(typical_period(stages)[0])
 
     def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Run the stage from displacements [m]; return which diverge, and which are certain."""
+        """Run the stage from displacements [m]; return which diverge, and which are certain, (n,)."""
         options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
         motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
         return motions.away, motions.away | motions.completed
@@ -242,7 +245,7 @@ def pushes_that_hunt(
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Push the stage at velocities [m/s]; return which hunt, and which are certain."""
+        """Push the stage at velocities [m/s]; return which hunt, and which are certain, (n,)."""
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
         return _caught(released, len(kicks), target, widest, landing_map, pushed(several, kicks))

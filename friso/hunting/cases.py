@@ -117,7 +117,8 @@ class Case:
     def unmoved(self) -> bool:
         """Tell whether the motion exerts too little force to move the stage.
 
-        A force that rises quickly breaks the stage away earlier; it then settles after a longer motion.
+        The result is false with a free joint. It is false, too, if the stage settles after a motion of more than twice
+        the widest band: a force that rises quickly may break it away below its static friction.
         """
         joint = self.stage.joint
         settles = any(time is not None for time in self.settling_time.values())
@@ -305,7 +306,7 @@ def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, break
     """Return the controller's force limit [N] if it holds the stage off its reference, or None.
 
     It does so if break-away takes more force, `breakaway` [N], or if the run ends with the force at the limit. The
-    result is None for a stage that settles, swings, or may still move.
+    result is None for a stage that settles, swings, or may still move, as `judgement` says.
     """
     settings = CheckSettings.current()
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible

@@ -147,8 +147,8 @@ def _multipliers(
 ) -> np.ndarray | None:
     """Return the largest multiplier of stages that differ slightly from one stage, (stages,).
 
-    `inside` is that stage, as keys and SI values; `changed` lists the changes, and `first` is its cycle. Returns None
-    if an orbit could not be closed, or a multiplier is complex.
+    `inside` is the one stage, as keys and SI values, and `first` is its cycle. `changed` has the new values of keys for
+    each of the others. Returns None if an orbit could not be closed, or a multiplier is complex.
     """
     count = len(changed)
     names = {name for change in changed for name, value in change.items() if value != inside[name]}

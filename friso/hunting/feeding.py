@@ -27,7 +27,7 @@ class Decline:
 
     `lasts` is the smallest scale at which the stage still hunts. `gone` is the largest scale below `lasts` at which it
     does not hunt. It is None if the stage hunts down to the last scale, and 0 if the cycle shrinks in proportion to its
-    cause. `certain` is true if all surveys down to there were certain.
+    cause. `certain` is true if all surveys down to `gone`, or to the last scale, were certain.
     """
 
     lasts: float

@@ -107,7 +107,8 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 def leaves_for_good(stage: Stage) -> bool:
     """Tell whether a stage that has left the range of all runs diverges for ever.
 
-    It does if the loop is unstable and no force limit with anti-windup can catch it in a larger swing.
+    The result is true if the loop is unstable and no force limit with anti-windup can catch the stage in a larger
+    swing.
     """
     stages = Ensemble.held(stage.flat(), 1)
     controller = stages.structure.controller
@@ -212,7 +213,7 @@ def _motor_state(stages: Ensemble, which: int) -> int:
 
 
 def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
-    """Yield states (count, states) in which one after the other is moved slightly from zero."""
+    """Yield states (count, states) at zero but for one state moved slightly, each state in turn."""
     settings = CheckSettings.current()
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -267,9 +268,10 @@ def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., n
 
 
 def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
-    """Return how much friction rises with speed [N s/m] above a high speed [m/s], (count,).
+    """Return how steeply friction rises with speed [N s/m] beyond a speed [m/s], (count,).
 
-    `output` names the friction force among the model's outputs.
+    It is the mean slope from this speed to twice the speed. `output` names the friction force among the model's
+    outputs.
     """
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed

@@ -81,8 +81,8 @@ class StageAttractors(ArrayRows):
 def can_hunt(flat: Mapping[str, Any]) -> bool:
     """Tell whether stages of one structure may hunt; `flat` has their keys in SI.
 
-    They need friction or a backlash, integral action that winds up, no dither, and a reference that stands still in the
-    end.
+    To hunt, stages need friction or a backlash, integral action that winds up, no dither, and a reference that stands
+    still in the end.
     """
     return not why_not(shared_structure(flat)) and not keeps_moving(flat)
 
@@ -216,5 +216,8 @@ def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions
 
 
 def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
-    """Return which motions were followed until they no longer swing, shape (count,)."""
+    """Return which motions come to rest for certain, or swing as little as at rest, (count,).
+
+    `flat` has the stages' keys in SI, and `rest` how their motions end.
+    """
     return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))

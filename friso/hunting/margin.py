@@ -222,8 +222,8 @@ class _Grid:
         """Find where attraction ends between the bandwidth factor numbered `at` and a neighbour.
 
         The neighbour is the next factor above (`ahead` 1) or below (-1). Returns None if attraction reaches the end of
-        the search, which is then recorded for all factors up to there. It does so too if closer inspection shows no
-        attractor. If the allowance is used up, the end is not certain.
+        the search, which is then recorded for all factors up to there. Returns None as well if closer inspection shows
+        no attractor at `at`. If the allowance is used up, the end is not certain.
         """
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
@@ -236,7 +236,7 @@ class _Grid:
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
         """Follow attraction from the bandwidth factor numbered `at` to its end.
 
-        It is followed up (`ahead` 1) or down (-1). Returns None if attraction reaches the end of the search, or if
+        Attraction is followed up (`ahead` 1) or down (-1). Returns None if it reaches the end of the search, or if
         closer inspection shows no attractor. Raises Exhausted if an allowance of work is used up.
         """
         if not self.proved(at, ahead):
@@ -264,9 +264,9 @@ class _Grid:
         return end
 
     def _pass(self, where: np.ndarray) -> None:
-        """Mark the factors past which a stable orbit was followed as attracting.
+        """Record that the stage hunts at the factors past which a stable orbit was followed.
 
-        `where`, shape (count,), is true for them.
+        `where`, shape (count,), is true for these factors.
         """
         self.passed |= where
         self.attracts |= where
@@ -315,7 +315,10 @@ class _Grid:
         return None
 
     def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
-        """Return the windows of factors with an attractor, except the window of number `besides`."""
+        """Return the windows of factors with an attractor, except the one with factor `besides`.
+
+        `besides` is the number of a factor.
+        """
         while True:
             before = self.attracts.copy()
             windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)

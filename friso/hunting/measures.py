@@ -123,7 +123,10 @@ def swing_of(runs: Runs) -> np.ndarray:
 
 
 def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
-    """Describe how a chunk of runs ends; `outside` names their band, "inner" or "outer"."""
+    """Describe how a chunk of runs ends; `outside` names their band, "inner" or "outer".
+
+    `turns` are the results of scanning their turning points.
+    """
     return End(
         completed=np.equal(runs.results.statuses, Status.DONE),
         swing=swing_of(runs),
@@ -152,7 +155,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
     done = results.statuses == Status.DONE
 
     def finished(array: np.ndarray) -> np.ndarray:
-        """Replace the measures of runs that were not completed by NaN."""
+        """Replace the entries of an array, (runs,), by NaN where the run was not completed."""
         return np.where(done, array, np.nan)
 
     return Measures(
@@ -178,6 +181,7 @@ def measure_traces(
     """Measure sampled runs, such as those of a drive as built.
 
     `flat` has the stages' keys in SI. Deviations [m] and forces [N] have the shape (runs, n), the times [s] (n,).
+    `solver` says which runs were completed.
     """
     done, places = solver.status == Status.DONE, [*stands(flat)]
     end = end_of_traces(time, deviation, BAND, done, corner_of(flat))

@@ -55,16 +55,16 @@ class AttractionEnd:
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """A window of bandwidths in which a stage hunts, by its two ends.
+    """A window of bandwidths in which a stage hunts, by its ends `low` and `high`.
 
-    The ends are factors of the stage's own bandwidth; None at the end of the search.
+    The ends are in factors of the stage's own bandwidth (None: the window reaches the end of the search).
     """
 
     low: AttractionEnd | None
     high: AttractionEnd | None
 
     def holds(self, factor: float) -> bool:
-        """Tell whether the stage hunts at a factor of its own bandwidth, by this window."""
+        """Tell whether a factor of the stage's own bandwidth lies in this window."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
 
@@ -98,10 +98,11 @@ class EdgeSearch:
     settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
-        """Find the end of attraction between the factors `at`, with motions, and `outside`.
+        """Find where attraction ends between two factors of the bandwidth, `at` and `outside`.
 
-        Raises Beyond if an attractor exists up to the end of the search. If an allowance of work is used up, the end is
-        as close as it was by then, and not certain; attraction may have been followed past `outside`.
+        At the first factor the stage has the attractors `motions`. Raises Beyond if an attractor exists up to the end
+        of the search. If an allowance of work is used up, the end is as close as it was by then, and not certain;
+        attraction may have been followed past `outside`.
         """
         place = _Place(at, motions, outside)
         try:
@@ -149,8 +150,8 @@ class EdgeSearch:
     def _just_beyond(self, end: float) -> tuple[float, np.ndarray]:
         """Return the factors beyond an orbit's end at which to look for attractors.
 
-        The first is next to the end, the others are farther off. Raises Beyond if the first is beyond the end of the
-        search.
+        The first result is the factor next to the end; the second, shape (n,), has factors farther off and may be
+        empty. Raises Beyond if the first is beyond the end of the search.
         """
         ahead = self._ahead(end)
         next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
@@ -164,7 +165,7 @@ class EdgeSearch:
         return next_to, farther[within]
 
     def _bracketed(self, place: _Place) -> AttractionEnd:
-        """Narrow down the edge by surveys where no orbit can be followed to it.
+        """Narrow down the edge by surveys where no orbit can be followed to it, updating `place`.
 
         Of several factors, the last with an attractor and the next one bracket the edge. The search repeats between
         them until they are close together. Raises Beyond if an attractor exists up to the end of the search.
@@ -191,7 +192,7 @@ class EdgeSearch:
                 return replace(end, certain=end.certain and self._surely_attracts(place))
 
     def _surely_attracts(self, place: _Place) -> bool:
-        """Tell whether the stage surely hunts, by a closed orbit or a thorough survey's swing."""
+        """Tell whether the stage surely hunts at `place`, by a closed orbit or a thorough survey."""
         if any(motion.cycles is not None for motion in place.motions):
             return True
         distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
@@ -280,7 +281,7 @@ def _orbit_distance(point: Point, orbit: Swinging) -> float:
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:
-    """Return the factor that comes first in the direction `ahead`: 1 up, -1 down."""
+    """Return whichever of two factors comes first in the direction `ahead`: 1 up, -1 down."""
     return float(min(one, other) if ahead > 0 else max(one, other))
 
 

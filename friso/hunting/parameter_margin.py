@@ -63,7 +63,7 @@ class ParameterMargin:
     def certain(self) -> bool:
         """Tell whether no side is open, and both ends, if there are any, are certain.
 
-        Ranges between the tried values may still differ.
+        Between the tried values, hunting may still begin and end unnoticed.
         """
         return not self.open_sides and all(end.certain for end in (self.below, self.above) if end)
 
@@ -154,7 +154,7 @@ class _Side:
     def _finer(self, first: int) -> np.ndarray:
         """Return factors to try between the factor numbered `first` and the one before.
 
-        At the first of both hunting has changed, at the other not.
+        Hunting has changed at the factor `first`, and has not at the one before.
         """
         settings = EdgeSettings.current()
         return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
@@ -162,8 +162,8 @@ class _Side:
     def _pair(self, first: int) -> np.ndarray:
         """Choose two factors, by number, to search thoroughly around the first change.
 
-        Their distances from it are `proved_distances`: close to the end of hunting, motions take long to decay, and a
-        rough survey may be wrong. New factors are surveyed roughly.
+        Their distances from the change are `proved_distances`: close to the end of hunting, motions take long to decay,
+        and a rough survey may be wrong. Factors that were not surveyed yet are surveyed roughly.
         """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]

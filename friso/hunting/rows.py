@@ -22,7 +22,7 @@ class ArrayRows:
 
 
 def _rows_of(part: Any, numbers: Any) -> Any:
-    """Select rows of an array, or of all arrays in a part; return anything else unchanged."""
+    """Select rows by number from an array, or all arrays in a `part`; return others unchanged."""
     if isinstance(part, np.ndarray):
         return part[numbers]
     if isinstance(part, tuple):

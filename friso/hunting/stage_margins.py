@@ -24,8 +24,8 @@ def friction_margin(stage: Stage, judgement: Judgement) -> ParameterMargin | Non
     """Find how much more or less static friction starts or ends hunting, Coulomb friction held.
 
     The range runs from static friction equal to Coulomb friction, or a fraction given by `SEARCH_LIMITS`, to a
-    multiple. Returns None if the friction law lacks one of both, if the stage cannot hunt, or if its attractors are
-    unknown.
+    multiple. Returns None if the friction law lacks static or Coulomb friction, if the stage cannot hunt, or if its
+    attractors are unknown.
     """
     flat = stage.flat()
     if not static_frictions(flat) or not _is_known(judgement):
@@ -53,7 +53,7 @@ def joint_margins(stage: Stage, judgement: Judgement) -> dict[str, ParameterMarg
 
 
 def _is_known(judgement: Judgement) -> bool:
-    """Tell whether a stage may hunt, and it is certain whether something attracts it."""
+    """Tell whether a judged stage may hunt, and it is certain whether something attracts it."""
     hunting, unclear = judgement.hunting, judgement.observed and judgement.hunting.target is None
     failed = judgement.verdict == "failed" or judgement.runs_away or hunting.passing
     return hunting.possible and hunting.certain and not failed and not unclear
@@ -69,11 +69,11 @@ def _margin(scaled: Scaled, judgement: Judgement, lowest: float) -> ParameterMar
 
 
 def keeps_friction_margin(stage: Stage, factor: float, work: float) -> bool | None:
-    """Tell whether a stage with a controller faster by `factor` stays quiet at other friction.
+    """Tell whether a stage with a controller faster by `factor` does not hunt at other friction.
 
     Static friction is multiplied and divided by the factor by which advice keeps away from an edge; it stays at least
-    Coulomb friction. Returns None for a law that lacks one of both. Returns None as well if this takes more than the
-    given work, or is not certain.
+    Coulomb friction. Returns None for a law that lacks static or Coulomb friction. Returns None as well if this takes
+    more than the given work, or is not certain.
     """
     flat = stage.flat()
     if not static_frictions(flat):

@@ -57,8 +57,8 @@ class Reversal:
 class Tracking:
     """Error of a stage that follows a moving reference [m]: largest, and RMS.
 
-    Over a `period` [s] the response has been `closed` as a periodic orbit; otherwise the error is that of the last
-    quarter of the run. `multiplier` is the growth of small deviations from that orbit per period, None if it was not
+    If the response was `closed` as a periodic orbit, the error is that of one `period` [s], otherwise that of the last
+    quarter of the run. `multiplier` is the growth of small deviations from the orbit per period, None if it was not
     closed.
     """
 
@@ -76,7 +76,7 @@ class Tracking:
 
     @property
     def attracts(self) -> bool:
-        """Tell whether neighbouring motions approach the periodic orbit."""
+        """Tell whether neighbouring motions approach the periodic orbit; False without an orbit."""
         return self.multiplier is not None and self.multiplier < 1
 
 
@@ -187,7 +187,10 @@ def _closed(shape: Kernel, flat: Mapping[str, Any], period: float, rtol: float) 
     size = len(shape.states)
 
     def later(starts: np.ndarray | None, periods: int = 1) -> np.ndarray | None:
-        """Return the states some periods later, shape (runs, kept); None where a run fails."""
+        """Return the states some periods after `starts`, shape (runs, kept); None if a run fails.
+
+        Without `starts`, there is one run of the stage's own motion.
+        """
         count = 1 if starts is None else len(starts)
         options = RunOptions(rtol=rtol, record_from=np.inf, least_swing=np.inf)
         ends = np.zeros((count, len(shape.full_state)))

@@ -24,13 +24,13 @@ WINDOW, HALF = 0.75, 0.5
 
 
 def clear(kinds, count):
-    """Mark all turning points with 0."""
+    """Set the marks `kinds` of the first `count` turning points to 0."""
     for k in range(count):
         kinds[k] = 0
 
 
 def maxima(values, count, kinds):
-    """Mark the local maxima with 1 and all others with 0.
+    """Mark the local maxima among the first `count` values with 1 in `kinds`, all others with 0.
 
     The first point of a level stretch stands for all of it. The ends count as maxima if they are higher than their
     neighbours; turning points usually are.
@@ -50,7 +50,7 @@ def maxima(values, count, kinds):
 
 
 def zigzag(values, count, least, kinds):
-    """Mark the extrema of a zigzag through `values` with legs of at least `least`.
+    """Mark in `kinds` the extrema of a zigzag through `values` with legs of at least `least`.
 
     Maxima get 1, minima -1, all others 0. A first and a last turning point that end such a leg are included.
     """
@@ -97,9 +97,9 @@ def keep_tallest(times, values, count, kinds, peaks):
 def mean_period(times, count, kinds, ended):
     """Return the mean time [s] between maxima in the last quarter, or else between minima.
 
-    The zigzag alternates between maxima and minima; its last extremum is left out, because that swing is not over yet.
-    A slower swing gives the time between the last two extrema of a kind in the last half. The result is NaN if there
-    are no two of a kind.
+    Extrema are marked in `kinds` (1, -1), and the run ended at `ended` [s]. Maxima and minima alternate; the last
+    extremum is left out, because that swing is not over yet. A slower swing gives the time between the last two extrema
+    of a kind in the last half. The result is NaN if there are no two of a kind.
     """
     last = -1  # the last swing is not over yet
     for k in range(count):
@@ -129,7 +129,7 @@ def span(times, values, count, since):
 
 
 def last_turn(times, count, kinds):
-    """Return the time of the last extremum of a zigzag [s], -inf without one."""
+    """Return the time of the last extremum marked in `kinds` [s], -inf without one."""
     last = -np.inf
     for k in range(count):
         if kinds[k] != 0:
@@ -140,8 +140,9 @@ def last_turn(times, count, kinds):
 def run(times, values, counts, swing, ended, since, kinds, peaks, distinct, period, turned, earlier):
     """Scan turning points of runs for peaks, period, last turn and earlier swing.
 
-    The results fill `peaks` and `distinct`, (runs, room), and `period`, `turned` and `earlier`, (runs,). They and the
-    arguments are those of `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), holds marks in between.
+    The results fill `peaks` and `distinct`, (runs, room), and `period`, `turned` and `earlier`, (runs,). Results and
+    arguments are as in `friso.hunting.turns.scan_turning_points`; `since` [s] is where the last half begins. `kinds`,
+    shape (room,), is room for marks.
     """
     for j in range(counts.size):
         count = counts[j]

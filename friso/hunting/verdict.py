@@ -77,9 +77,9 @@ UNCHECKED = "runs with hardly different masses, which show whether chance decide
 class CheckPart(StrEnum):
     """Part of a check: reported as it begins, and by name if it runs out of work.
 
-    The names are in `Judgement.given_up`. The first three parts are computed in this order; `STARTS` is left out
-    without an attractor. `LOWER_BANDWIDTHS` replaces `BANDWIDTHS` if the stage hunts up to the highest bandwidth.
-    `FRICTION` comes after these, and `FEEDING` for a hunting stage with a backlash.
+    The names are in `Judgement.given_up`. `ATTRACTION`, `STARTS` and `BANDWIDTHS` are computed in this order; `STARTS`
+    is left out without an attractor. `LOWER_BANDWIDTHS` replaces `BANDWIDTHS` if the stage hunts up to the highest
+    bandwidth. `FRICTION` comes after these, and `FEEDING` for a hunting stage with a backlash.
     """
 
     ATTRACTION = "what attracts the stage"
@@ -116,7 +116,7 @@ class Judgement:
     - `followed` [s]: time for which the motion was continued (None: only to its own end, as the longer run was not
       needed or not completed).
     - `observed`: the attractor was seen in long simulations only, not closed as an orbit.
-    - `lasting` [m]: peak-to-peak swing of this motion if it is no known attractor but lasts to the end.
+    - `lasting` [m]: peak-to-peak swing of the stage's own motion, if it lasts to the end but is no known attractor.
     - `runs_away`: the motion diverges from its reference.
     - `running_away`: displacements after which the stage diverges (None: not looked for).
     - `given_up`: parts that would have taken more work than was allowed.
@@ -145,7 +145,7 @@ class Judgement:
 
     @property
     def cycle(self) -> Cycle | None:
-        """Return the cycle that matters most: the stable one, or else the first."""
+        """Return the cycle that matters most: the stable one, or else the first; None without any."""
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
 
@@ -190,7 +190,10 @@ def _without_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage without an attractor: whether it rests, and at which bandwidths it hunts."""
+    """Judge a stage without an attractor: whether it rests, and at which bandwidths it hunts.
+
+    `motions` has its own motion, and `attraction` the search for attractors. `tell` is called with the verdict.
+    """
     with allowance(CheckSettings.current().rest_work_share * work) as spent:
         rest = followed_motions(
             stage.flat(),
@@ -242,7 +245,10 @@ def _with_a_target(
     work: float,
     tell: Callable[[Verdict], None],
 ) -> Judgement:
-    """Judge a stage with an attractor: whether its own motion, or another start, leads there."""
+    """Judge a stage with an attractor: whether its own motion, or another start, leads there.
+
+    `target` is how far and how late a run must swing to count as hunting. `begin` and `tell` are called as in `judge`.
+    """
     settings = CheckSettings.current()
     with allowance() as spent:
         own = own_motion(stage, target, settings.rest_work_share * work)
@@ -292,8 +298,8 @@ class OwnMotion:
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Run the stage's own motion, also with slightly different masses, and find how it ends.
 
-    The motion hunts if it ends in a swing of the size and period of `target`. If it still swings, but less far or less
-    often, it may be decaying. It is continued if the given work suffices.
+    The motion hunts if it ends in a swing of the size and period of `target`. A motion that still swings, but less far
+    or less often, may be decaying. It is then continued, if the given work suffices.
     """
     settings = CheckSettings.current()
     flat = stage.flat()
@@ -371,14 +377,20 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
 
 
 def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
-    """Tell whether runs failed while no kick, or no move, was seen to start hunting."""
+    """Tell whether runs failed, so that kicks or moves that start hunting may have been missed.
+
+    The result is true if no kick (or no move) was seen to start hunting, but runs failed.
+    """
     kicks = [kick for kick in (displacement, push) if kick]
     lost = any(kick.unknown and not kick.windows for kick in kicks)
     return lost or (moved is not None and not moved.hunting and moved.count < BasinSettings.current().drawn_moves)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[CheckPart, ...]]:
-    """Search other bandwidths for hunting; return the result and the part of the check given up."""
+    """Search other bandwidths for hunting, within an amount of `work`.
+
+    Returns the result, and as a second tuple this part of the check if its answer is incomplete, else nothing.
+    """
     attracting = attraction.target is not None
     with allowance(work) as search:
         sought = search_bandwidths(stage, attracting, attraction.surveyed)

@@ -120,7 +120,10 @@ def _searched(stages: Ensemble, rtol: float, distances: np.ndarray | None, cycle
 
 
 def resolved_map(stages: Ensemble, motions: Sequence[Swinging]) -> LandingMap | None:
-    """Return the return map of one stage if its attractors are just `motions`, else None."""
+    """Return the return map of one stage if its attractors are exactly the cycles `motions`.
+
+    Returns None if they are not, or if the stage has no map that decides.
+    """
     if not has_a_map(stages) or stages.remember:
         return None
     survey = survey_maps(stages)
@@ -158,7 +161,7 @@ def sketched(stages: Ensemble) -> Sketch:
 
 
 def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
-    """Return coarse return maps of stages, and which are resolved, shape (count,).
+    """Return coarse return maps of stages, and for which they decide what attracts, (count,).
 
     The maps are None if the stages have none.
     """
@@ -195,7 +198,7 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
 
 
 def _hardly_attracts(landing_map: LandingMap) -> bool:
-    """Tell whether a coarse map has no attractor that can be trusted.
+    """Tell whether a stage's coarse return map has no attractor that can be trusted.
 
     A trusted attractor is simple, strongly stable, and reached from enough points. Where a stage next sticks almost as
     far off as before, straight pieces between points create long cycles that the stage does not have.
@@ -211,7 +214,7 @@ def _hardly_attracts(landing_map: LandingMap) -> bool:
 
 
 def _seen_on_map(mapped: Mapped, stage: int) -> Iterator[Swinging]:
-    """Yield the attractors of a stage's map as observed motions."""
+    """Yield the attractors on the return map of the stage numbered `stage`, as observed motions."""
     landing_map, length = mapped.maps[stage], float(mapped.stages.length[stage])
     for attractor in landing_map.attractors:
         distances, swings = np.abs(attractor.distances), len(attractor.distances)
@@ -230,7 +233,7 @@ _SEARCHES_ALONE = ContextVar("searches alone", default=False)
 
 @contextmanager
 def search_alone() -> Iterator[None]:
-    """Switch return maps off within the block, so that stages are searched from many starts.
+    """Switch return maps off in the `with` block: stages are searched from many starts.
 
     Comparing both results shows whether maps are right.
     """

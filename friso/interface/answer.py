@@ -143,7 +143,7 @@ class Answer:
 
     @property
     def subject(self) -> Any:
-        """Return the argument of the functions that show the answer.
+        """Return what the functions that show the answer take as their argument.
 
         The subject is the result, or the answer itself if it has attributes besides.
         """
@@ -160,9 +160,10 @@ class Answer:
         return False
 
     def _shown_by(self, module: str, function: str, otherwise: Any, *more: Any) -> Any:
-        """Show the answer by a function of the question's folder, and return its result.
+        """Show the answer by a `function` in a `module` of the question's folder.
 
-        Returns `otherwise` if the folder has no such function.
+        Returns what that function returns for the answer's subject and `more` arguments, or `otherwise` if there is no
+        such function.
         """
         name = f"{self.package}.{module}"
         shown = getattr(import_module(name), function, None) if self.package and find_spec(name) else None
@@ -293,7 +294,10 @@ class Answer:
         return [place]
 
     def _page(self, place: Path) -> str:
-        """Return the HTML page that belongs to a path. Raises InputError for a command without a page."""
+        """Return the HTML page of the answer.
+
+        Raises InputError, which names the path `place`, for a command without a page.
+        """
         page = next((content for name, content in self.files().items() if name.endswith("html")), None)
         if not isinstance(page, str):
             raise InputError("path", str(place), f"a folder: friso {self.command} has no page", 'report("folder")')

@@ -59,9 +59,9 @@ def _label(record: Mapping[str, Any], number: int) -> str:
 
 
 def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
-    """Yield keys with numbers and texts of a table; a key in a table within has both names.
+    """Yield keys with numbers and texts of a table, `record`, and of the tables in it.
 
-    `before` is the name of the tables around it.
+    Keys in a table within begin with the name of that table. `before` begins all keys.
     """
     for key, value in record.items():
         if isinstance(value, dict):

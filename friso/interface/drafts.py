@@ -121,7 +121,7 @@ class Drafts:
 
 
 def _duplicate(path: Path, spare: Path) -> None:
-    """Give a file a second name, by a link or a copy; a symbolic link stays a link."""
+    """Give a file a second name, `spare`, by a link or a copy; a symbolic link stays a link."""
     try:
         os.link(path, spare, follow_symlinks=False)
     except (OSError, NotImplementedError):  # the disk has no links

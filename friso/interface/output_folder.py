@@ -136,7 +136,10 @@ class OutputFolder:
         return written(contents)
 
     def _marker(self, names: Iterable[str], digests: Digests) -> dict[Path, Content]:
-        """Return the marker file, if the folder is the command's own; see `marker`."""
+        """Return the marker file's path and content; empty if the folder is not the command's own.
+
+        The marker names the files that the command wrote, with `digests` of its texts (see `marker`).
+        """
         return {self.folder / MARKER: marker(self.command, names, digests)} if self.is_own else {}
 
 
@@ -305,7 +308,10 @@ def digests_of(folder: Path) -> Digests:
 
 
 def _is_edited(text: Path, digests: Sequence[str]) -> bool:
-    """Tell whether a text differs from what friso wrote; False if it cannot be read."""
+    """Tell whether the file `text` differs from all that friso wrote, by their `digests`.
+
+    The result is False if the file cannot be read.
+    """
     try:
         return sha256(text.read_bytes()).hexdigest() not in digests
     except OSError:
@@ -315,7 +321,7 @@ def _is_edited(text: Path, digests: Sequence[str]) -> bool:
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:
     """Build the refusal of a folder that is not new, empty or the command's own.
 
-    `expected` says what else the folder may be.
+    `maker` is the command that made the folder ("": none), and `expected` says what else the folder may be.
     """
     made = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
     holds = "a store of friso map" if maker == STORE_MAKER else made

@@ -37,9 +37,9 @@ TOPICS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 
 @dataclass(frozen=True)
 class Choices:
-    """A list below the help of a command: names, each with one line on it.
+    """A list below the help of a command: a title, and names, each with one line on it.
 
-    The list is read only when the help is shown.
+    `rows` is called, to read the list, only when the help is shown.
     """
 
     title: str
@@ -104,7 +104,10 @@ class Question:
     """Module whose function `run` replaces the usual command, which only shows the answer."""
 
     def __post_init__(self) -> None:
-        """Check the topic, and the place in the list of commands. Raises ValueError or TypeError."""
+        """Check the topic, and the place in the list of commands.
+
+        Raises ValueError for an unknown topic, and TypeError for a place that is no number.
+        """
         if self.topic not in TOPICS:
             raise ValueError(f"topic {self.topic!r} is none of {', '.join(TOPICS)}")
         if not isinstance(self.place, int | float):
@@ -117,7 +120,7 @@ class Question:
 
     @property
     def module(self) -> str:
-        """Return the name of the module that holds the function."""
+        """Return the name of the module that holds the question's function."""
         return f"{self.package}.question"
 
     @property

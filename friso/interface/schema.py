@@ -50,7 +50,10 @@ def _document(cls: type[Section], title: str, described: Mapping[str, str]) -> N
 
 
 def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node:
-    """Return the schema of a table; `described` holds comments on keys by dotted names."""
+    """Return the schema of a table that the class `cls` reads, which stands at `place`.
+
+    `described` holds comments on keys by dotted names.
+    """
     documented = _attributes(cls)
     properties = {}
     for key, field in cls.model_fields.items():
@@ -67,7 +70,10 @@ def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node
 
 
 def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping[str, str]) -> Node:
-    """Return the schema of the values of a key."""
+    """Return the schema of the values of a key, by its annotation and the metadata of that.
+
+    `path` is the dotted name of the key, and `described` holds comments on keys.
+    """
     for item in metadata:
         if isinstance(item, Table):
             return _one_of(item.pick, path, described)
@@ -111,7 +117,7 @@ def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
 
 
 def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
-    """Return the schema of a table that is one of several classes."""
+    """Return the schema of a table that is read by one of several classes, which `pick` names."""
     tables = [_table(cls, path, described) for cls in _classes(pick)]
     if len(tables) == 1:
         return {**tables[0], "description": _sentence(described.get(path, "")) or tables[0].get("description", "")}
@@ -119,7 +125,7 @@ def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
 
 
 def _classes(pick: Any) -> list[type[Section]]:
-    """Return the classes that a table may be read as; its keys decide on one of them."""
+    """Return the classes that a table may be read as; `pick` chooses one by the table's keys."""
     variants = getattr(pick, "__self__", None)
     if isinstance(variants, Controllers):
         return [form for forms in variants.forms.values() for form in forms]

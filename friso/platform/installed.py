@@ -72,7 +72,8 @@ def load_module(group: str, name: str, module: str) -> ModuleType:
 def load_declared(group: str, name: str, module: str, attribute: str, kind: Any = object) -> Any:
     """Return what a package's module declares as an `attribute`.
 
-    Raises InputError if the module cannot be imported, or declares nothing of this `kind`.
+    The module is the one called `name` in a `group` of entry points. Raises InputError if the module cannot be
+    imported, or declares nothing of this `kind`.
     """
     declared = getattr(load_module(group, name, module), attribute, None)
     if declared is None or not isinstance(declared, kind):

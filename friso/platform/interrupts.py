@@ -46,7 +46,7 @@ def came() -> int:
 
 
 def last_word(number: int) -> str:
-    """Return the last line that a command prints, which says which signal ended it."""
+    """Return the last line of a command, which says that the signal `number` ended it."""
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"
@@ -91,7 +91,7 @@ def raising() -> Iterator[None]:
 def raise_what_waits() -> None:
     """Raise KeyboardInterrupt for a signal that came during an import.
 
-    It is called before work that must not be cut short, because a later signal would have to wait for its end.
+    Commands call this before work that must not be cut short, because a later signal would have to wait for its end.
     """
     while _waits and not _held:
         time.sleep(_AGAIN)
@@ -168,8 +168,8 @@ def _end_in_time(pipe: int) -> None:
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
     """Schedule a KeyboardInterrupt again that Python would lose in a finalizer or a callback.
 
-    Python ignores exceptions there and prints a traceback. Other exceptions go to the handler `otherwise`, but not work
-    that an interrupt cuts short.
+    Python ignores exceptions there and prints a traceback. `what` describes the exception. Any other one goes to the
+    handler `otherwise`, unless it is due to an interrupt that came before.
     """
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
         signal_later(_AGAIN, _arrived)

@@ -25,8 +25,9 @@ _TRIES = 3
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
     """Make a new, locked folder that only this user may open; remove it in the end.
 
-    The lock shows that it is no leftover. Leftovers of killed processes are removed first. Raises OSError if no folder
-    can be made and locked.
+    The folder lies in `root`, and its name begins with `prefix`. The file `lock` in it is held, which shows that the
+    folder is no leftover. Leftovers of killed processes are removed first. Raises OSError if no folder can be made and
+    locked.
     """
     remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
@@ -43,7 +44,7 @@ def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
 
 
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
-    """Return a new folder and its lock.
+    """Return a new folder in `root`, whose name begins with `prefix`, and its lock.
 
     Before the lock is held, another process may remove the folder, and filelock makes it again, readable for others.
     Then another folder is tried.

@@ -20,7 +20,10 @@ EXPECTED = f"a path with names of at most {LONGEST_NAME} bytes, and of at most {
 
 
 def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> str:
-    """Return why a path cannot name a file or a folder; "" if it can."""
+    """Return why a path cannot name a file or a folder; "" if it can.
+
+    Names in the path may have at most `longest_name` bytes.
+    """
     text = os.fspath(path)
     if not text:
         return "an empty path"
@@ -38,9 +41,9 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 
 def unwritable(path: Path) -> tuple[str, str] | None:
-    """Return why nothing can be written to a path, and what can be; None if it may be written.
+    """Return why nothing can be written to a path, and what is expected instead; None if it can.
 
-    The path may have no name, a name that is too long, or one that Windows does not accept.
+    Both are in words. The path may have no name, a name that is too long, or one that Windows does not accept.
     """
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"

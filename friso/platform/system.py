@@ -98,7 +98,7 @@ if sys.platform == "win32":
     def check_free(path: Path) -> None:
         """Raise OSError if a file cannot be replaced.
 
-        The file is read-only, or another program holds it open.
+        That is so if the file is read-only, or if another program holds it open.
         """
         if not os.access(path, os.W_OK):
             raise OSError(errno.EROFS, "it is read-only", str(path))
@@ -318,7 +318,7 @@ def open_file(path: Path, flags: int) -> int:
 
 
 def replace_file(draft: Path, path: Path) -> None:
-    """Rename a file over another, once no other program holds that open. Raises OSError."""
+    """Rename a draft over a file, once no other program holds the file open. Raises OSError."""
     once_free(partial(draft.replace, path))
 
 
@@ -347,7 +347,7 @@ if sys.platform == "linux":
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
         """Return the quota of processor time of this process's control groups, in cores.
 
-        Both versions of control groups count. The quota is infinite without a limit.
+        Groups of version 1 and version 2 count. The quota is infinite without a limit.
         """
         try:
             lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]

@@ -22,11 +22,11 @@ FOR_ALL, FOR_USER = 0o666, 0o600
 
 @contextmanager
 def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False, kept: bool = False) -> Iterator[BinaryIO]:
-    """Return a stream whose content replaces a file when the block ends.
+    """Return a stream whose content replaces a file when the `with` block ends.
 
-    If the block fails, nothing is left. A new file is readable for everyone whom the user's settings allow, or with
-    `FOR_USER` for this user alone; the permissions of a replaced file may be `kept`. Raises OSError, and
-    FileExistsError if the file has to be `new` and something is there by then.
+    If the block fails, nothing is left. With `mode` FOR_ALL, a new file is readable for everyone whom the user's
+    settings allow, with `FOR_USER` for this user alone; the permissions of a replaced file may be `kept`. Raises
+    OSError, and FileExistsError if the file has to be `new` and something is there by then.
     """
     draft = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)

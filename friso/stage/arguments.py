@@ -275,8 +275,8 @@ def _read_stage(source: Any) -> Stage:
 def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
     """Raise InputError for an argument of a wrong type, or for an unusable path.
 
-    `kinds` say what it may be. With `sets`, the function has an option to set keys, and the error suggests it for a
-    dictionary.
+    `kinds` say what the argument may be. With `sets`, the function has an option to set keys, and the error suggests it
+    for a dictionary.
     """
     if kinds and not any(kind.holds(value) for kind in kinds.values()):
         words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))

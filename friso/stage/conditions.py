@@ -1,4 +1,4 @@
-"""The table [conditions]: under which the machine runs that [friction] was measured of."""
+"""The table [conditions]: how the guide runs, against when its [friction] was measured."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
 def _falls(flat: Mapping[str, Any]) -> Any:
     """Tell whether static friction is at least Coulomb friction under the operating conditions.
 
-    The result is true for laws that do not have both. It is also true if static friction is smaller without the
+    The result is true for laws that lack one of these levels. It is also true if static friction is smaller without the
     conditions, because the friction law reports that.
     """
     if not {"friction.static", "friction.coulomb"} <= {*flat}:

@@ -133,10 +133,7 @@ class ControllerSection(AgainstFriction):
 
     @classmethod
     def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
-        """Tell whether the controller acts on a measured velocity.
-
-        That may come from another encoder than the position.
-        """
+        """Tell whether the controller acts on a measured velocity, which may have its own encoder."""
         return cls.feeds_back == "velocity"
 
     @classmethod

@@ -59,9 +59,9 @@ class Correlations:
         return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
     def over(self, keys: list[str]) -> np.ndarray:
-        """Return the correlation matrix of all `keys`, shape (keys, keys).
+        """Return the correlation matrix of `keys`, shape (keys, keys), in their order.
 
-        They must include the keys of this object; the others are independent.
+        The keys must include those of this object; all others are independent.
         """
         matrix = np.eye(len(keys))
         places = [keys.index(key) for key in self.keys]
@@ -132,7 +132,10 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
-    """Check that all keys are uncertain keys of the stage. Raises InputError otherwise."""
+    """Check that all correlated keys are uncertain keys of the stage.
+
+    Raises InputError for an unknown key, and StageError for one that is not uncertain.
+    """
     keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:
@@ -166,8 +169,8 @@ class Sample:
 def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sample:
     """Sample stages from a stage with uncertain keys; the same seed gives the same stages.
 
-    They follow a scrambled Sobol sequence (Owen 1998). Raises StageError if no key is uncertain, or if hardly any
-    sample is a valid stage.
+    `count` valid stages are returned. Keys are correlated as `correlations` say, and follow a scrambled Sobol sequence
+    (Owen 1998). Raises StageError if no key is uncertain, or if hardly any sample is a valid stage.
     """
     from scipy.stats import qmc
 
@@ -219,7 +222,8 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return which samples are valid stages, and which rule between keys the others break.
 
-    Both have the shape (count,); the rule is "" if a key exceeds its bound, or for none. `keys` has the values [SI].
+    Both have the shape (count,). The rule is "" for a valid stage, and where a key exceeds its bound. `keys` has the
+    values [SI].
     """
     fields = stage.numeric_keys()
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)

@@ -117,7 +117,10 @@ def _stage_of(text: str, origin: str, folder: Path | None = None) -> Stage:
 
 
 def _with_whole_paths(tables: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return tables in which a `file` beside the stage file has its full path."""
+    """Return tables in which a `file` that stands in `folder` has its full path.
+
+    Without a folder, the tables are returned unchanged.
+    """
     whole: dict[str, Any] = dict(tables)
     for name, table in tables.items():
         if folder is not None and isinstance(table, dict) and isinstance(table.get("file"), str):
@@ -192,7 +195,7 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
-    """Read a text file; `expected` says in errors what it should be.
+    """Read a text file; errors say what was `expected`, and show the `example`.
 
     With `latin` it may be Latin-1, as older programs write it. Raises InputError, also for a device, a pipe, or more
     than MOST_BYTES.

@@ -21,7 +21,10 @@ DERIVATIONS: dict[str, Derivation] = {}
 
 
 def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
-    """Decorate a function that computes the keys that follow from a table."""
+    """Return a decorator that registers a function for a table of the stage file.
+
+    The function computes the keys that follow from that table.
+    """
 
     def register(derivation: Derivation) -> Derivation:
         DERIVATIONS[table] = derivation

@@ -26,7 +26,7 @@ class Values(tuple[Any, ...]):
 
     @property
     def text(self) -> list[Any]:
-        """Return the values as the user wrote them."""
+        """Return the values, each as the user wrote it."""
         return [getattr(value, "text", value) for value in self]
 
 

@@ -52,7 +52,7 @@ class Tone(NamedTuple):
 class Stand(NamedTuple):
     """A place where the reference stands still.
 
-    It stops there at `corner` [s] and leaves at `until` [s], or stays to the end of the run.
+    The reference stops there at `corner` [s] and leaves at `until` [s], or stays to the end of the run.
     """
 
     corner: Any

@@ -193,9 +193,10 @@ def _written(stage: Stage, key: str) -> str:
 
 
 def _question(written: str, usual: _Usual) -> str:
-    """Ask whether another unit was meant, with which the number as written would be usual.
+    """Return a question whether another unit was meant, in which the value would be usual.
 
-    The result is "" if there is no such unit, or if an interval was written.
+    `written` is the value as the user wrote it, and its number must be usual in that unit. The result is "" if there is
+    no such unit, or if an interval was written.
     """
     number, _, unit = written.partition(" ")
     for other in usual.units:

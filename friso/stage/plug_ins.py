@@ -38,10 +38,10 @@ class PlugIn:
         return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
 
     def load(self) -> None:
-        """Import the module, unless that has been done; a script is always run again.
+        """Import the module, unless it has been imported; a script is always run again.
 
-        It is imported by its name if that leads to its file, else from the file. Raises ImportError if there is no
-        file.
+        The module is imported by its name if that leads to its file, else from the file. Raises ImportError if there is
+        no file.
         """
         if self.module in sys.modules and self.module != SCRIPT:
             return

@@ -46,7 +46,10 @@ class Rule:
 
 
 def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
-    """Return the keys below a table or a row of an array, without its name."""
+    """Return the keys of a table or a row of an array, without `place` and the dot before them.
+
+    `place` is the name of the table, such as "controller" or "controller.filters.2".
+    """
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
@@ -58,7 +61,7 @@ one."""
 class Section(BaseModel):
     """A table of a TOML file.
 
-    Wrong data raise the section's `refusal`.
+    Wrong data raise the exception class that the section names as `refusal`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -315,7 +318,10 @@ def nearest_name(name: Any, names: Iterable[str]) -> str | None:
 
 
 def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
-    """Make the error for a key that does not exist, with the nearest of the existing `names`."""
+    """Make the error for an unknown key, with the nearest of the existing `names`.
+
+    The error shows the `example`.
+    """
     near = nearest_name(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
     return InputError(key, hint, f"one of {', '.join(names)}", example)

@@ -308,7 +308,7 @@ class Stage(Section):
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """Return the stage with dotted keys set, or removed by None, checked like a file.
 
-        Raises StageError.
+        Raises StageError for a change that makes no valid stage.
         """
         if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
             expected = "a dictionary of keys to new values"
@@ -392,9 +392,10 @@ def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
 
 
 def _of_another_form(error: StageError, changes: Mapping[str, Any], others: Sequence[str]) -> StageError:
-    """Return the error for changes to a form of controller of which the tables lack some keys.
+    """Return a clearer error for keys of another form of controller than the stage file's.
 
-    `others` are the keys of the form in the tables. Other errors are returned unchanged.
+    A form is one way to give a controller, such as by rules or by gains. `error` says that keys of the other form are
+    missing; `others` are the keys in the file. An error about anything else is returned unchanged.
     """
     if not error.actual.startswith("nothing"):
         return error
@@ -433,17 +434,17 @@ _MOTOR_LAW = f"{MOTOR_FRICTION}.model"
 
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return unit, bound and example of every numeric key that a stage like this can have.
+    """Return unit, bound and example of every numeric key that a stage can have.
 
-    `flat` has the stage's keys, whose tables decide. Units are those of its axis.
+    `flat` has the stage's keys, which name its tables. Units are those of its axis.
     """
     return {key: field.on(axis_of(flat)) for key, field in declared_keys(flat).items()}
 
 
 def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Return unit, bound and example of every numeric key, in the units of a linear axis.
+    """Return unit, bound and example of every numeric key that a stage can have.
 
-    `flat` has the keys of a stage, whose tables decide.
+    `flat` has the stage's keys, which name its tables. Units are those of a linear axis.
     """
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
@@ -487,7 +488,7 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
 def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
     """Yield each rule between keys, and where the stage's keys in SI break it.
 
-    The second is a boolean, or an array if keys have arrays.
+    "Where" is a boolean, or an array of booleans if keys have arrays.
     """
     for name, owner in (("", Stage), *_tables(flat).items()):
         at_motor = name == MOTOR_FRICTION

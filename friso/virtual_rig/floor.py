@@ -41,7 +41,10 @@ def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int
 
 
 def variance_below(floor: Floor, frequencies: np.ndarray) -> np.ndarray:
-    """Return the variance [m^2/s^4] of the floor's acceleration below frequencies [Hz]."""
+    """Return the variance [m^2/s^4] of the floor's acceleration below frequencies [Hz].
+
+    The result has the shape of `frequencies`.
+    """
     total = np.zeros(len(frequencies))
     for (low, high), (first, last) in zip(pairwise(floor.frequency), pairwise(floor.acceleration), strict=True):
         slope = 2 * np.log(last / first) / np.log(high / low) + 1

@@ -83,7 +83,7 @@ def run(
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
 ) -> Iterator[RecordedRuns]:
-    """Run a stage with its real drive several times, each with its own noise.
+    """Run a stage with its real drive on a task several times, once for each seed of its noise.
 
     Signals are logged every `interval` [s], a whole number of samples. `changes` are flat keys to SI numbers, or to
     arrays with one number for each run, as in a sweep or for machines drawn at random. The runs come chunk by chunk,
@@ -102,7 +102,7 @@ def run_flat(
     threads: int | None = None,
     outputs: bool = False,
 ) -> Iterator[RecordedRuns]:
-    """Run stages with a complete drive several times, on a floor that may shake.
+    """Run stages with a complete drive on a task, once for each seed, on a floor that may shake.
 
     The stages are given as flat keys to SI numbers, or arrays with one for each run. Signals are logged every
     `interval` [s]; the runs come chunk by chunk. With `outputs`, all signals of the equations are recorded, not only
@@ -223,7 +223,7 @@ def _outputs(
 def _interpolated(table: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Interpolate an evenly spaced table at places, counted in the table's points.
 
-    Beyond its ends the table keeps its end values.
+    The result has the shape of `place`. Beyond its ends the table keeps its end values.
     """
     return np.interp(place, np.arange(len(table)), table)
 

@@ -21,8 +21,9 @@ from friso.virtual_rig.task import MoveTask
 def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
     """Return friction, motor constant, floor and injected force of runs as tables.
 
-    Stages are given as flat keys to SI numbers or arrays of shape (runs,). `seeds` are the seeds of the runs' noise;
-    rails have the machines' "rail.seed". If the runs do not differ, all share one table.
+    Stages are given as flat keys to SI numbers or arrays of shape (runs,). `seeds` are the seeds of the runs' noise.
+    Friction along a rail has a seed of its own, the stage's "rail.seed". If the runs do not differ, all share one
+    table.
     """
     places, grid = _places(flat, task)
     varied = [key for key, value in flat.items() if key.startswith(("rail.", "drive.ripple")) and np.ndim(value)]

@@ -96,7 +96,7 @@ def staircase(steps: Sequence[float], stands: float) -> MoveTask:
 def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
     """Return the task of moving at constant velocities [m/s] in turn, each for a time [s].
 
-    The reference begins at `start` [m]; a velocity of 0 is a standstill.
+    `parts` are pairs of velocity and time. The reference begins at `start` [m]; a velocity of 0 is a standstill.
     """
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
@@ -107,7 +107,7 @@ def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
 def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
     """Return the task of moving from place to place [m], with a stand [s] after each move.
 
-    Acceleration [m/s^2] and speed [m/s] are bounded.
+    Moves accelerate and brake at `acceleration` [m/s^2], and are no faster than `top_speed` [m/s].
     """
     rows, now = [[0.0, places[0], 0.0, 0.0]], stands
     for start, end in pairwise(places):

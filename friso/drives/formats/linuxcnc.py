@@ -104,12 +104,12 @@ HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforwa
 
 
 def recognises(name: str, text: str) -> bool:
-    """Recognise the file by a section of a joint, an axis or the whole machine."""
+    """Tell whether the file has a section of a LinuxCNC joint, axis or machine."""
     return re.search(rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]", text, re.MULTILINE) is not None
 
 
 def whole(text: str, beside: Beside) -> str:
-    """Replace each #INCLUDE line by the text of the file that it names.
+    """Replace each #INCLUDE line by the text of the file that it names, as read by `beside`.
 
     Only files in the folder of the INI file are taken in. Included files cannot include others.
     """

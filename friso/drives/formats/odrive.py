@@ -140,7 +140,7 @@ _RECOGNISED = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.axis[0-9]{1,3}\.[\w.]{1,180}[ 
 
 
 def recognises(name: str, text: str) -> bool:
-    """Recognise JSON with the gains of an axis, or lines for odrivetool."""
+    """Tell whether the file is JSON with the gains of an axis, or has lines for odrivetool."""
     in_json = text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
     return in_json or bool(_RECOGNISED.search(text))
 
@@ -282,7 +282,10 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
 
 
 def _mode(axis: AxisParameters, name: str, default: float) -> float:
-    """Return the number of a mode, which the file may also give by name."""
+    """Return the number of a mode `name`, which the file may also give by a symbol.
+
+    An absent mode has the number `default`.
+    """
     return axis.number(f"{CONFIG}.{name}", default, SYMBOLS[name])
 
 

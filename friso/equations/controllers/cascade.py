@@ -39,7 +39,10 @@ SLOWER = 4.0
 
 
 class CascadeTerms(NamedTuple):
-    """Which terms a cascade has; terms that it lacks are left out of the equations."""
+    """Which terms a cascade has; terms that it lacks are left out of the equations.
+
+    They are the integrals of both loops, the filter of the velocity, and `feedforward`, by the names of its keys.
+    """
 
     position_integral: bool
     velocity_integral: bool
@@ -131,10 +134,10 @@ class Cascade(ControllerSection):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try: names to the keys that change [SI].
+        """Return other structures to try, by name: a mapping of the keys that change to values [SI].
 
-        They move the integral to the other loop, add feedforward, drop the integral, or switch pseudo-derivative
-        feedback on or off.
+        A structure moves the integral to the other loop, adds feedforward, drops the integral, or switches
+        pseudo-derivative feedback on or off. None as a value removes the key.
         """
         listed: dict[str, Mapping[str, Any]] = {}
         outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)

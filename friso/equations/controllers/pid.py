@@ -29,7 +29,7 @@ class Pid(ControllerSection):
     def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
         """Choose the class that reads a [controller] table: by rules or by gains.
 
-        Raises StageError for keys of both or of neither.
+        `forms` are the classes to choose from. Raises StageError for keys of both or of neither.
         """
         by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.recognised_by)
         keys_of = {

@@ -28,7 +28,10 @@ SLOWER = 4.0
 
 
 class Terms(NamedTuple):
-    """Which terms a PID controller has; terms that it lacks are left out of the equations."""
+    """Which terms a PID controller has; terms that it lacks are left out of the equations.
+
+    They are the integral, the derivative and its filter, and `feedforward`, by the names of its keys.
+    """
 
     integral: bool
     filtered: bool
@@ -102,9 +105,10 @@ class PidGains(Pid):
 
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
-        """Return other structures to try: names to the keys that change [SI].
+        """Return other structures to try, by name: a mapping of the keys that change to values [SI].
 
-        They take the derivative of the other signal, add feedforward, or drop or add the integral.
+        A structure takes the derivative of the other signal, adds feedforward, or drops or adds the integral. None as a
+        value removes the key.
         """
         listed: dict[str, Mapping[str, Any]] = {}
         if flat[KD] and flat[DERIVATIVE_ON] == "error":
@@ -126,7 +130,7 @@ class PidGains(Pid):
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """Return the controller's gains and times, and those of an equivalent P over PI loop.
 
-        The latter are left out if there is no such loop.
+        The gains of the P over PI loop are left out if there is no such loop.
         """
         kp, ki, kd = flat[KP], flat[KI], flat[KD]
         listed = [*super().gains(flat)]

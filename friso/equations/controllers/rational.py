@@ -181,10 +181,10 @@ class RationalController(ControllerSection):
 
 
 def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the timing keys that follow from the controller's own sample time.
+    """Return the timing keys that follow from the controller's own sample time [s].
 
-    They set the drive's sample time if the file has none, else the period of a controller that runs more slowly than
-    the drive.
+    That time becomes the drive's sample time if the file has none. Otherwise it becomes the period of a controller that
+    runs more slowly than the drive.
     """
     if SAMPLE_TIME not in flat:
         return {}
@@ -195,10 +195,10 @@ def _timing(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _coefficients(roots: TransferRoots, sample_time: float | None) -> dict[str, float]:
-    """Compute integral, static stiffness and sections of a transfer function, by key.
+    """Compute integral, static stiffness and sections of a transfer function, by key [SI].
 
-    `sample_time` [s] is that of a transfer function in z, None for one in s. Raises InputError for a controller that is
-    unstable, is not proper, has several integrals, or does not pull back.
+    `roots` are its zeros, poles and gain. `sample_time` [s] is that of a transfer function in z, None for one in s.
+    Raises InputError for a controller that is unstable, is not proper, has several integrals, or does not pull back.
     """
     zeros, poles, scale = _times(roots, sample_time)
     infinite = np.isinf(poles)
@@ -251,8 +251,8 @@ def _beside(leak: float, zeros: np.ndarray, poles: np.ndarray) -> tuple[float, f
 def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray, np.ndarray, float]:
     """Return zeros and poles as times t of factors 1 + t s, and the gain before them.
 
-    A pole at s = 0 has an infinite time. A root r in z becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) +
-    (1 + r) s T/2.
+    A pole at s = 0 has an infinite time. With a `sample_time` T [s] the roots are in z, else in s. A root r in z
+    becomes, with z = (1 + s T/2)/(1 - s T/2), the factor (1 - r) + (1 + r) s T/2.
     """
     zeros, poles = np.asarray(roots.zeros, complex), np.asarray(roots.poles, complex)
     if sample_time is None:
@@ -282,7 +282,7 @@ def _times(roots: TransferRoots, sample_time: float | None) -> tuple[np.ndarray,
 
 
 def _expanded(times: np.ndarray) -> np.ndarray:
-    """Return the coefficients of 1, s, s^2, ... of prod(1 + t s)."""
+    """Return the coefficients of 1, s, s^2, ... of prod(1 + t s) over the `times` t."""
     polynomial = np.ones(1, complex)
     for time in times:
         polynomial = np.append(polynomial, 0) + time * np.append(0, polynomial)
@@ -290,10 +290,10 @@ def _expanded(times: np.ndarray) -> np.ndarray:
 
 
 def _sections(times: np.ndarray) -> list[tuple[float, float | None]]:
-    """Return the coefficients of s and s^2 of second-order factors.
+    """Return the coefficients of s and s^2 of second-order factors, one pair for each factor.
 
-    They are made of factors 1 + t s with the `times` t, in pairs. With an odd number of times, the last factor is of
-    first order and has None for s^2.
+    The factors are products of two factors 1 + t s, for the `times` t. With an odd number of times, the last factor is
+    of first order and has None for s^2.
     """
     pairs = sorted((t for t in times if t.imag > 1e-12 * abs(t)), key=abs, reverse=True)
     real = sorted((t.real for t in times if abs(t.imag) <= 1e-12 * abs(t)), key=abs, reverse=True)
@@ -307,7 +307,7 @@ def _wrong(actual: str, expected: str) -> InputError:
 
 
 def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
-    """Make the error message for an unstable pole, in s or in z."""
+    """Make the error for an unstable pole, in z if there is a `sample_time`, else in s."""
     if sample_time is None:
         worst = poles[np.argmax(np.real(poles))]
         expected = "poles left of 0, and one at 0 for an integral; a transfer function in z needs its sample_time"
@@ -318,7 +318,7 @@ def _unstable(poles: np.ndarray, sample_time: float | None) -> InputError:
 
 
 def polynomial_roots(numerator: Sequence[float], denominator: Sequence[float]) -> TransferRoots:
-    """Return the roots of a quotient of polynomials, each given from the highest power down.
+    """Return the roots of numerator / denominator, polynomials from the highest power down.
 
     Raises InputError if the coefficients of either are all 0, or if the numerator has the higher degree.
     """

@@ -65,8 +65,8 @@ class TransferFunction(RationalController):
     def roots(cls, flat: Mapping[str, Any]) -> TransferRoots:
         """Return zeros, poles and gain, whichever way the file gives them.
 
-        Raises InputError if the file gives them in none of the three ways, or in several. It is also raised for a
-        quotient that is not proper.
+        Raises InputError if the file gives them in none of the three ways, in several, or as a quotient that is not
+        proper.
         """
         if _ways(flat) != 1:
             actual = "none of them" if not _ways(flat) else "several of them"
@@ -91,6 +91,6 @@ def _quotient(flat: Mapping[str, Any], place: str) -> TransferRoots:
 
 
 def _roots(flat: Mapping[str, Any], key: str) -> np.ndarray:
-    """Return the roots listed under a key; the conjugates of complex roots are added."""
+    """Return the complex roots listed under a key, (n,); conjugates of complex ones are added."""
     roots = [complex(flat[name]) for name in element_keys(flat, key)]
     return np.array([one for root in roots for one in ((root, root.conjugate()) if root.imag else (root,))])

@@ -134,15 +134,18 @@ class VanDijk(Pid):
 
 
 def controller_table(crossover: str) -> dict[str, Any]:
-    """Return a [controller] table for a crossover such as "8 Hz", with the usual alpha and beta.
+    """Return a [controller] table for a crossover such as "8 Hz", with alpha and beta as usual.
 
-    They are those of the examples.
+    The usual alpha and beta are those of the examples.
     """
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 
 
 def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
-    """Return the keys of a controller by van Dijk's rules, for a crossover [Hz] and a mass [kg]."""
+    """Return the keys of a controller by van Dijk's rules, for a crossover [Hz] and a mass [kg].
+
+    `alpha` and `beta` are the rules' other numbers.
+    """
     return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}
 
 

@@ -61,7 +61,8 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
     """Return the condition of passivity that a damped bristle violates; "" if it is passive.
 
-    A fully bent bristle yields `softer` times as fast as in LuGre. `power` writes that factor in the condition.
+    A fully bent bristle yields `softer` times as fast as in LuGre. `power` is the exponent that the condition then
+    shows, such as "^2".
     """
     levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer

@@ -39,9 +39,9 @@ class Friction:
     """A friction law's equations: the force [N] against the velocity, its states and its scales.
 
     `component` has states, outputs, and kinks (where derivatives jump). `breakaway` [N] is the largest force at rest,
-    from which the solver takes its length scale. `sliding` is for a steady motion at the velocity. It gives the law's
-    own states, its modes with memory, and the sides of its kinks other than the direction. Without `sliding`, they are
-    the values at which the states do not change. At rest all modes with memory have been left.
+    from which the solver takes its length scale. `sliding` maps symbols to their values in a steady motion at the
+    velocity: the law's own states, its modes with memory, and the sides of its kinks other than the direction. Without
+    `sliding`, these are the values at which the states do not change. At rest all modes with memory have been left.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ class StribeckSection(FrictionSection):
     def variant(flat: Mapping[str, Any]) -> Any:
         """Return the choices that decide the equations of a Stribeck curve, from the law's keys.
 
-        They are the exponent, if it is a small whole number, whether directions differ, and whether there are
+        They are the exponent (None unless it is a small whole number), whether directions differ, and whether there are
         [conditions].
         """
         exponent = float(flat["friction.stribeck_exponent"])
@@ -193,7 +193,8 @@ class StribeckSection(FrictionSection):
 def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
     """Return the level of friction g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j).
 
-    It is smooth in v while `sign`, the direction of the velocity, is held.
+    It is smooth in v while `sign`, the direction of the velocity, is held. `curve` has the choices that decide the
+    terms.
     """
     from sympy import exp
 
@@ -211,7 +212,7 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
 
 
 def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return the level of friction g(v) [N] from the velocity alone.
+    """Return the level of friction g(v) [N] from the velocity alone; `curve` has its choices.
 
     It is not differentiable at rest.
     """
@@ -229,7 +230,10 @@ TINY = 1e-60
 
 
 def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
-    """Return the viscous force [N], smooth in v while `sign`, the direction of v, is held."""
+    """Return the viscous force [N]; `curve` has the choices that decide its terms.
+
+    The force is smooth in v while `sign`, the direction of v, is held.
+    """
     from friso.equations.component import key
 
     force = key("friction.viscous") * velocity

@@ -35,7 +35,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Any:
-        """Tell whether [conditions] multiply the level."""
+        """Tell whether [conditions] multiply the law's level of sliding friction."""
         return has_conditions(flat)
 
     @staticmethod
@@ -67,7 +67,10 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
-        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost."""
+        """Return keys with the measured stiffness and sliding friction; the break-away peak is lost.
+
+        `elements` has no effect on a law with one spring.
+        """
         return {
             "friction.coulomb": measured.levels.coulomb,
             "friction.viscous": measured.levels.viscous,
@@ -76,7 +79,7 @@ class Dahl(FrictionSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction; nothing of its shape is free."""
+        """Return the law's keys for measured friction; `shape` is ignored, as no key shapes the law."""
         return Dahl.keeping(measured, 1)
 
 

@@ -60,7 +60,7 @@ class Elements(NamedTuple):
 
 
 def _as_many(key: str, what: str, two: str) -> Rule:
-    """Return the rule that the list `key` has one value for each element stiffness, or none.
+    """Return the rule that the list `key` has one value for each element stiffness, or is empty.
 
     In the error message, `what` names a value of the list, and `two` is an example for two elements.
     """
@@ -190,9 +190,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
         """Return `FITTED` elements on a virgin curve of rolling friction, at evenly spaced slopes.
 
-        `shape` has the exponent of the rolling friction and some factors. One factor for each element but the first
-        makes the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck
-        velocity.
+        `shape` has the exponent of the rolling friction, and factors. For each element but the first, one factor makes
+        the element stiffer. The factor "lag" lengthens the lag of friction, relative to LuGre at the Stribeck velocity.
         """
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)
@@ -210,7 +209,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Return the range of the attraction [N/s], which measurements leave open, by its key.
 
-        It is a factor of ten each way. No virgin curve determines the attraction.
+        The range is a factor of ten each way, because no virgin curve determines the attraction.
         """
         usual = measured.stiffness * measured.levels.stribeck_velocity
         return {"friction.attraction": (usual / 10, usual * 10)}

@@ -60,7 +60,7 @@ class LuGre(StribeckSection):
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """Return the law's keys for measured friction; nothing of its shape is free."""
+        """Return the law's keys for measured friction; `shape` is ignored, as no key shapes the law."""
         return keeping_bristle(measured)
 
     @staticmethod

@@ -67,9 +67,9 @@ class MeasuredFriction:
         return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
 
     def misfit(self, force: np.ndarray) -> float:
-        """Return the largest deviation from another virgin curve [N], over static friction.
+        """Return the largest deviation from another virgin curve, `force` [N], over static friction.
 
-        Both curves have the same displacements.
+        Both curves have the same displacements; the result has no unit.
         """
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
@@ -77,8 +77,9 @@ class MeasuredFriction:
 def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
     """Return displacements [m] at which to compare virgin curves, shape (n,).
 
-    They reach beyond break-away, or to the last of `corners` if that lies farther. They include all `corners`, the
-    displacements at which a curve made of straight pieces bends.
+    They reach beyond break-away, which follows from `static` friction [N] and `stiffness` [N/m], or to the last of
+    `corners` if that lies farther. They include all `corners`, the displacements at which a curve made of straight
+    pieces bends.
     """
     usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
     places = usual * np.linspace(0.0, 1.0, POINTS) ** 2
@@ -112,8 +113,9 @@ def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.nda
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
     """Return a virgin curve whose slope falls with a power of the force that is still missing.
 
-    The power is Dahl's exponent. The result is the force [N] over displacement [m] from rest, both of shape (n,). With
-    an exponent below 1 the curve ends at static friction; with 0 it is straight.
+    The curve begins with `stiffness` [N/m], and rises to `static` friction [N]. The power is Dahl's exponent. The
+    result is the force [N] over displacement [m] from rest, both of shape (n,). With an exponent below 1 the curve ends
+    at static friction; with 0 it is straight.
     """
     way, more = stiffness * displacement / static, exponent - 1
     lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
@@ -130,9 +132,9 @@ SLACK = 0.02
 
 
 def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
-    """Return the range of candidates that a measurement cannot distinguish from the best.
+    """Return the lowest and highest candidate that a measurement cannot tell from the best.
 
-    Their misfit is almost as small.
+    Candidates between these limits have misfits almost as small as the best one.
     """
     good = candidates[misfits <= np.min(misfits) + SLACK]
     return float(good.min()), float(good.max())

@@ -118,11 +118,11 @@ ROUNDED = 1e-4
 
 
 def softening(lacking: Any, exponent: Any) -> Any:
-    """Return abs(r)^(i - 1), rounded at r = 0 and still 1 at rest.
+    """Return abs(r)^(i - 1), rounded at r = 0 and still 1 at rest, where r = `lacking` is 1.
 
-    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with d = ROUNDED. A bare power is 0 at r = 0. Bristles of a body that
-    rolls steadily would then not follow a small change of the level. The linearised law would also change abruptly as i
-    leaves 1. Rounding changes the force by less than d F_s.
+    It is ((r^2 + d^2)/(1 + d^2))^((i - 1)/2) with the `exponent` i and d = ROUNDED. A bare power is 0 at r = 0.
+    Bristles of a body that rolls steadily would then not follow a small change of the level. The linearised law would
+    also change abruptly as i leaves 1. Rounding changes the force by less than d F_s.
     """
     return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)
 

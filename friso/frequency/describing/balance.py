@@ -135,7 +135,7 @@ class _Loop:
         return stiffness - loop, np.abs(stiffness - loop) / (np.abs(stiffness) + np.abs(loop))
 
     def refined(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return frequencies [Hz] with more inserted where the loop turns by TURN or more."""
+        """Return ascending frequencies [Hz], (n,), with more inserted where the loop turns by TURN."""
         settings = FrequencySettings.current()
         for _ in range(settings.grid_halvings):
             logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)

@@ -116,7 +116,11 @@ def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> 
 def _variables(
     amplitudes: np.ndarray, force: np.ndarray, rest: Mapping[str, np.ndarray]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
-    """Return a describing function's variables: dimensions, values (pairs, ...), attributes."""
+    """Return a describing function's variables: dimensions, values (pairs, ...), attributes.
+
+    `amplitudes` [m] and the harmonics `force` [N] have one row for each pair of amplitude and frequency. `rest` has the
+    other variables by name.
+    """
     plane = ("amplitude", "frequency")
     stiffness = force[:, 1] / amplitudes
     named = {
@@ -134,7 +138,10 @@ def _variables(
 
 
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
-    """Return positive numbers as an array. Raises InputError for anything else."""
+    """Return positive numbers of an option `name` as an array, shape (n,).
+
+    Raises InputError with an `example` for anything else, and for no numbers.
+    """
     array = np.atleast_1d(np.asarray(values, dtype=float))
     if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0)):
         raise InputError(name, str(values), "positive numbers in one row", example)

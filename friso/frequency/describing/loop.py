@@ -47,6 +47,6 @@ def _loop(form: Structure) -> Declared:
 
 
 def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:
-    """Return where the limiter would be touched, for largest joint deflections [m]."""
+    """Return where joint deflections [m] exceed the stroke of a free joint, in their shape."""
     free = "joint.stroke" in flat and not flat["joint.locked"]
     return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)

@@ -107,8 +107,9 @@ def balanced(
     """Return the periodic motion near a known one, with harmonics up to the order `harmonics`.
 
     `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion. The last sample
-    lies one interval before the first comes again. A `mirrored` motion is its own mirror image after half a period.
-    Raises InputError for a stage without friction or for a law with more than one state of its own.
+    lies one interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. The
+    friction force is computed in `intervals` per period (None: as the settings say). Raises InputError for a stage
+    without friction or for a law with more than one state of its own.
     """
     settings = FrequencySettings.current()
     law, size = (
@@ -132,8 +133,8 @@ def balanced(
 def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
     """Return "done" if a series is a motion of the stage, and otherwise why it is none.
 
-    It is none if Newton's method did not converge, or if the limiter would be touched. Nor is it if its amplitude is
-    tiny against the known motion's, `length` [m], so that the stage rests.
+    It is none in three cases: Newton's method did not converge; the limiter would be touched; or the amplitude is tiny
+    against `length` [m], that of the known motion, so that the stage rests.
     """
     settings = FrequencySettings.current()
     if series.amplitude < settings.resting_share * length:
@@ -149,7 +150,7 @@ class _Problem:
     """The equations X_k = R(k omega) F_k(X, omega) of harmonic balance, in real numbers.
 
     Unknowns are real and imaginary parts of the harmonics, divided by `length` [m], the amplitude of the known motion.
-    The last one is the logarithm of omega over the `omega` of that motion. `start` has the harmonics of the known
+    The last unknown is the logarithm of omega over the `omega` of that motion. `start` has the harmonics of the known
     motion, which also fixes the phase.
     """
 
@@ -174,7 +175,7 @@ class _Problem:
         return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
 
     def residual(self, state: np.ndarray) -> np.ndarray:
-        """Return the residuals of the equations; the last one is the condition on the phase."""
+        """Return the residuals of the equations, (unknowns,); the last is that of the phase."""
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length
@@ -182,12 +183,12 @@ class _Problem:
 
     @property
     def _phase(self) -> np.ndarray:
-        """Return the direction in which a time shift moves the known motion."""
+        """Return the direction, among the harmonics' parts, in which a time shift moves the motion."""
         real, imaginary = np.split(self.start, 2)
         return np.concatenate([-imaginary * self.basis.orders, real * self.basis.orders])
 
     def jacobian(self, state: np.ndarray) -> np.ndarray:
-        """Return the derivative of the residuals by the unknowns."""
+        """Return the derivatives of the residuals by the unknowns, shape (unknowns, unknowns)."""
         _, speed = self.split(state)
         answer, nudge = self.answer(state), 1e-6
         stretched = self.basis.slopes @ state[:-1]
@@ -219,12 +220,15 @@ class _Problem:
         return state, size
 
     def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
-        """Return what fraction of a step leads closer to the solution: 1, a half, a quarter, ..."""
+        """Return what fraction of a step leads closer to the solution: 1, a half, a quarter, ...
+
+        `state` are the unknowns, and `left` is the size of the residuals there.
+        """
         settings = FrequencySettings.current()
         shares = [0.5**halving for halving in range(settings.series_halvings)]
         return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
 
 
 def _parts(values: np.ndarray) -> np.ndarray:
-    """Return real parts followed by imaginary parts."""
+    """Return the real parts of complex numbers (n,), followed by the imaginary parts, (2 n,)."""
     return np.concatenate([np.real(values), np.imag(values)])

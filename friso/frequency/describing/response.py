@@ -1,8 +1,8 @@
 """Compute the frequency response of a plant with friction, as a drive measures it.
 
-It depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force (Gelb,
-Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls with the
-amplitude are unstable; which of the others appears depends on the history of the analyser.
+The response depends on the amplitude of the force. The analyser divides the first harmonic of the position by the force
+(Gelb, Vander Velde 1968, quasi-linear response). One force may have several responses. Those at which the force falls
+with the amplitude are unstable; which of the others appears depends on the history of the analyser.
 """
 
 from __future__ import annotations
@@ -88,7 +88,10 @@ def plant_response(
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """Return the quantities of every root by name: values, SI unit, and a description."""
+    """Return the quantities of every root by name: values, SI unit, and a description.
+
+    `branch_points` are the roots, the amplitudes at which forces move the plant `driven`.
+    """
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
@@ -131,7 +134,7 @@ def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int,
 def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
     """Return the response [m/N] that an analyser shows, shape (forces, frequencies).
 
-    It is NaN if no branch is stable.
+    The analyser steps up (`order` 1) or down (-1) in frequency. The result is NaN where no branch is stable.
     """
     chosen = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
     answer, lasting = (np.take_along_axis(branches[name], chosen, axis=2)[:, :, 0] for name in ("response", "lasting"))
@@ -141,8 +144,8 @@ def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
     """Return the number of the branch that an analyser shows at every frequency.
 
-    The shape is (forces, frequencies). It steps up (`order` 1) or down (-1), and shows the stable branch nearest in
-    amplitude to the previous one; at the start, the smallest.
+    The shape is (forces, frequencies). The analyser steps up (`order` 1) or down (-1), and shows the stable branch
+    (`lasting`) nearest in amplitude to the previous one; at the start, the smallest.
     """
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)
@@ -157,7 +160,10 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """Return for each force and frequency what is wrong with the responses, or "done"."""
+    """Return what is wrong with the responses, or "done", shape (forces, frequencies).
+
+    `branches` has the quantities over force, frequency and branch. `unknown` marks where friction was not found.
+    """
     settings = FrequencySettings.current()
     present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
     count = np.sum(present, axis=2)

@@ -30,7 +30,7 @@ from friso.stage.tables import friction_law
 class OneStateLaw:
     """A friction law with at most one state z, as functions of parameters, velocity and z.
 
-    They give the rate of change of z and the force, each with its derivatives by z and velocity.
+    The functions return the rate of change of z and the force, each with its derivatives by z and velocity.
     """
 
     values: Mapping[str, Any]
@@ -81,9 +81,9 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
 
 @dataclass(frozen=True)
 class FrictionAnswer:
-    """Friction force [N] at the middles of intervals (M,), and the parts of its derivative.
+    """Friction force [N] at the middles of intervals (M,), and what its derivative is made of.
 
-    The derivative is by the velocities at the middles: see `along`.
+    The derivative is by the velocities at the middles; `along` applies it.
     """
 
     force: np.ndarray
@@ -130,8 +130,8 @@ def _middles(z: np.ndarray) -> np.ndarray:
 def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
     """Compute the friction force on a periodic motion from velocities [m/s], shape (M,).
 
-    They are those at the middles of M intervals, each an `interval` [s] long. After these the motion is back at its
-    start (`sign` 1), or at the mirror image (-1).
+    Velocities are taken at the middles of M intervals, each an `interval` [s] long. After these the motion is back at
+    its start (`sign` 1), or at the mirror image (-1).
     """
     settings = FrequencySettings.current()
     z = np.zeros(len(velocity) + 1)

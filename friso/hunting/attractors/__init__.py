@@ -31,7 +31,8 @@ class Target(ArrayRows):
 
     A run hunts if it still swings after the time `lasting` [s], by at least `amplitude` [m], half of peak to peak. Its
     period must be at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
-    Where attractors were only `observed` in simulations, others nearby may swing as far but less often.
+    `observed` is true where attractors were only seen in simulations; motions nearby may then swing as far, but less
+    often.
     """
 
     amplitude: Any
@@ -92,7 +93,7 @@ class Attractors:
         return Target(amplitude, period, lasting, early, observed)
 
     def take(self, numbers: np.ndarray) -> Attractors:
-        """Select the survey of the stages with these numbers, each once."""
+        """Return the survey's results for the stages with these numbers, renumbered in their order."""
         motions_of: dict[int, list[Swinging]] = {}
         for motion in self.motions:
             motions_of.setdefault(motion.stage, []).append(motion)
@@ -113,14 +114,14 @@ def attractors(
 ) -> Attractors:
     """Find the attractors of stages, by simulation from many starts and from the return map.
 
-    For many stages, one attractor each is enough. A `thorough` survey looks for all of them. Where only simulations
-    show an attractor, a thorough survey repeats them at a hundredth of the tolerance. Orbits are closed to the relative
-    tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are finite.
+    One attractor of each stage is enough, unless the survey is `thorough`, which looks for all of them. A thorough
+    survey repeats simulations at a hundredth of the tolerance for stages of which no orbit was closed. Orbits are
+    closed to the relative tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are
+    finite. Without `cycles`, only simulations are used, and a motion that has converged counts as attracted.
 
-    Without `cycles`, many stages are surveyed by simulation alone, and a motion that has converged counts as attracted.
     A thorough survey runs all starts at once, as does one with `suggested` cycles: eight runs together take as long as
-    one. It also starts beside unstable cycles. A stage for which no suggested cycle was closed gets as many starts as
-    in a thorough survey.
+    one. Both also start runs beside unstable cycles. A stage for which no suggested cycle was closed gets as many
+    starts as in a thorough survey.
 
     If its allowance of work is used up, a thorough survey returns the attractors it has by then; a stage counts as
     decided where an orbit was closed. Other surveys raise Exhausted.
@@ -168,7 +169,10 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
 
 
 def _try_memories(begun: Starts, survey: Survey) -> None:
-    """Survey stages that have no attractor yet, from starts with bristles bent by past motion."""
+    """Survey stages that have no attractor yet, from starts with bristles bent by past motion.
+
+    `begun` has the starts of all stages; the survey is extended.
+    """
     left = np.flatnonzero(~survey.attracted)
     if left.size:
         starts = begun.take(left)
@@ -180,7 +184,8 @@ def _try_memories(begun: Starts, survey: Survey) -> None:
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
     """Survey stages that have no attractor yet, from cycles that the return map suggests.
 
-    Near a fold the basin of a stable cycle is narrower than the spacing of the usual starts.
+    `begun` has the starts of all stages; the survey is extended. Near a fold the basin of a stable cycle is narrower
+    than the spacing of the usual starts.
     """
     left = np.flatnonzero(~survey.attracted)
     if not left.size:

@@ -26,7 +26,10 @@ def close_orbits(
     parts = []
 
     def close_from(group: np.ndarray, starts: np.ndarray, times: np.ndarray, n: int) -> Cycles:
-        """Close orbits of `n` swings for the runs with the numbers `group`."""
+        """Close orbits of `n` swings for the runs with the numbers `group`.
+
+        `starts`, shape (group, states), are states near the orbits, and `times` [s] the approximate times of return.
+        """
         sign = -1.0 if n % 2 else 1.0
         stages = runs.stages.take(group)
         if sign < 0:
@@ -64,7 +67,7 @@ def _repeat_after(stages: Ensemble, orbits: Orbits, fewer: int, rtol: float) -> 
 
 
 def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.ndarray:
-    """Return which orbits repeat the simpler orbit `once` by `passes` times, shape (count,).
+    """Return which orbits, shape (count,), only repeat the simpler orbit `once`, `passes` times.
 
     Compared are the sticking distance, in the state numbered `sticking`, and the time of return.
     """
@@ -76,10 +79,11 @@ def _alike(once: Orbits, orbits: Orbits, passes: float, sticking: int) -> np.nda
 
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
-    """Return a state of each run, (runs, states), in which it sticks within `times` [s].
+    """Return a state in which each run sticks, (runs, states), within twice the `times` [s].
 
     At this instant the integrator balances the constant forces on a stage at rest. If there are several such instants,
-    the one after the longest standstill is taken. `times` has the shape (runs,).
+    the one after the longest standstill is taken; if there is none, the state at the start. `pending` are the runs, and
+    `times` has the shape (runs,).
     """
     settings = SurveySettings.current()
     stages, size = pending.stages, len(pending.stages.kernel.states)
@@ -97,7 +101,7 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
     """Return at which sample, with a fraction, the integrator balances the constant forces.
 
-    There the imbalance of both, `residuals`, passes zero. Among several such instants, the one with the longest
+    At this sample `residuals`, their imbalance, passes zero. Among several such samples, the one with the longest
     standstill before it counts; 0 is returned if there is none. `place` [m] is the position that sticks. Both arrays
     have the shape (samples,).
     """

@@ -12,12 +12,16 @@ from friso.hunting.rows import ArrayRows
 
 @dataclass(frozen=True)
 class Recurrence(ArrayRows):
-    """Repetition of runs, arrays of shape (runs,).
+    """Whether and how runs repeat themselves, arrays of shape (runs,).
 
-    `swings` is the smallest number of swings after which a run repeats (0: it does not repeat) and `time` [s] their
-    duration. `better` and `better_time` [s] are swings and duration of the most accurate repetition, and `deviation` is
-    its error over `size`, the peak-to-peak deviation [m]. `earlier` is the same error computed some swings earlier.
-    Times and errors are NaN for a run that does not repeat. `mean` [m] is the mean size of single swings.
+    - `swings`: smallest number of swings after which a run repeats (0: it does not); `time` [s]: how long they take.
+    - `better`, `better_time` [s]: likewise for a larger number of swings that repeats much more closely, if there is
+      one.
+    - `size` [m]: peak-to-peak deviation; `deviation`: error of the repetition after `better` swings, over `size`.
+    - `earlier`: this error, computed some swings earlier (NaN: too few swings).
+    - `mean` [m]: mean size of single swings.
+
+    Times and errors are NaN for a run that does not repeat.
     """
 
     swings: np.ndarray

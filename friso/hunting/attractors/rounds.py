@@ -77,7 +77,10 @@ def typical_period(stages: Ensemble) -> np.ndarray:
 
 
 def loose_from(stages: Ensemble) -> np.ndarray:
-    """Return the distance [m] from which a stage breaks away rather than creeps home, (count,)."""
+    """Return the smallest tested distance [m] from which a stuck stage overshoots, (count,).
+
+    From smaller distances it creeps home. If it overshoots from none, the result is the largest tested distance.
+    """
     settings = SurveySettings.current()
     shares = np.geomspace(*settings.creep_distances)
     distances = shares * stages.length[:, None]

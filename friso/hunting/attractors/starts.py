@@ -48,7 +48,7 @@ class Starts:
         self.states: list[np.ndarray] = []
 
     def take(self, numbers: np.ndarray) -> Starts:
-        """Return the stages with these numbers, without any starts yet."""
+        """Return an empty list of starts for the stages with these numbers."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: np.ndarray | bool) -> None:
@@ -82,7 +82,7 @@ class Starts:
     def _wound_up(self, which: np.ndarray, side: float) -> None:
         """Add runs released at distances on one side, with their integrators wound up.
 
-        `which` are the numbers of the stages; `side` is 1 or -1.
+        `which` are the numbers of the stages, which have a force limit; `side` is 1 or -1.
         """
         settings = SurveySettings.current()
         span, times = settings.wound_up_starts
@@ -99,8 +99,8 @@ class Starts:
         """Add runs of stages with several bristles, bent in the ways in which motions leave them.
 
         Some runs are released at a distance, with the controller switched on before the release or at the release; some
-        are pushed. Others stick, after one of three pasts: a draw away from the reference, a long way out or back, or
-        random travels to and fro. A `thorough` survey gets more distances.
+        are pushed. Others stick, after one of three pasts: a travel outward over the distance itself, a long travel out
+        or back, or random travels to and fro. A `thorough` survey gets more distances.
         """
         settings = SurveySettings.current()
         units = REMEMBERED[0 if thorough else 1]

@@ -141,7 +141,7 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int, which: np.ndar
 
 @dataclass
 class Survey:
-    """State of a survey of several stages, and the ways to go on with it.
+    """Progress of a survey of several stages: settings, the attractors so far, and work left.
 
     A `thorough` survey looks for every attractor. A survey that must `prove` attraction closes orbits; otherwise a
     motion that has converged counts as attracted. A survey that `decides` may take more steps. `unbounded` marks stages
@@ -190,7 +190,10 @@ class Survey:
 
     @property
     def runs_away(self) -> np.ndarray:
-        """Return which stages diverge from farther starts than those that come to rest, (count,)."""
+        """Return which unbounded stages diverge from far off, shape (count,).
+
+        Their farthest start from which a run diverges is farther than any from which a run comes to rest.
+        """
         return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
@@ -252,10 +255,11 @@ class Survey:
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
-        """Close orbits from runs that repeat themselves; return the runs that still swing.
+        """Close orbits from runs that repeat themselves; return the numbers of runs still to follow.
 
-        The result has the numbers of runs that still swing without an attractor. With `early`, orbits are closed only
-        in proofs, from runs that repeat well and resemble no unstable cycle: another round is cheaper.
+        The runs to follow swing, and have no attractor in the survey yet. `ends` is how the runs ended in the last
+        round, and `owners`, shape (runs,), are the numbers of their stages. With `early`, orbits are closed only to
+        prove attraction (another round is cheaper), from runs that repeat well and resemble no unstable cycle.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
@@ -270,9 +274,9 @@ class Survey:
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
     def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return the swinging runs whose stages have solver steps left after this round.
+        """Return the numbers of the swinging runs whose stages have solver steps left.
 
-        The stages of the others are marked unknown.
+        The steps of the last round, in `ends`, are charged to the stages. A stage without any left is marked unknown.
         """
         np.subtract.at(self.left, owners, ends.steps)
         spent = self.left[owners[swinging]] <= 0
@@ -280,9 +284,9 @@ class Survey:
         return swinging[~spent]
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return for each run how many different motions of its stage may be followed on.
+        """Return how many different motions of its stage may be followed on, for each run, (runs,).
 
-        The number follows from the solver steps that are left.
+        The number follows from the solver steps that its stage has left, and is never below `most_kinds`.
         """
         settings = SurveySettings.current()
         runs = np.bincount(owners, minlength=self.count)
@@ -295,7 +299,8 @@ class Survey:
     ) -> np.ndarray:
         """Choose one run of each kind, that is with equal period and size, to stand for the others.
 
-        At most `most` runs per stage are chosen, by their numbers. A stage with more kinds is marked unknown.
+        At most `most` runs per stage are chosen; their numbers are returned. A stage with more kinds is marked unknown.
+        Of the runs `beside` an unstable cycle, a few stand for all on that side.
         """
         chosen, surplus = _kinds(owners, ends, most, beside)
         self.unknown[owners[surplus]] = True
@@ -315,7 +320,7 @@ class Survey:
         return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """Return which runs resemble an unstable cycle, or a motion without a stable orbit."""
+        """Return which runs resemble an unstable cycle, or a motion without a stable orbit, (runs,)."""
         return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
     def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -406,8 +411,8 @@ class Survey:
     def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Return which runs repeat as exactly as only a motion on an attractor does, shape (runs,).
 
-        A run that resembles an unstable cycle counts only if attraction must be proved and another cycle lies beside
-        that one (`_stay`). If no proof is needed, runs that clearly approach a repetition count as well.
+        A run that resembles an unstable cycle counts only if attraction must be proved and the run lies on another
+        cycle beside that one (`_stay`). If no proof is needed, runs that clearly approach a repetition count as well.
         """
         settings = SurveySettings.current()
         repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)

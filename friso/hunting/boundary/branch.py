@@ -48,7 +48,10 @@ class Point:
 
     @classmethod
     def of(cls, stages: Ensemble, place: float, cycle: Cycles, jacobians: np.ndarray | None = None) -> Point:
-        """Make the point of one cycle, from the stage that it belongs to and its place on the line."""
+        """Make the point of one cycle, from the stage that it belongs to and its place on the line.
+
+        `jacobians` is the Jacobian with which the cycle was closed, if it is known.
+        """
         distance = abs(float(cycle.states[0, stages.sticking]))
         return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle, jacobians)
 
@@ -65,7 +68,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Branch:
-    """Cycles in order along a branch, and the reasons why it ends on either side.
+    """A branch of cycles: its `points` in order, and why it `ends` on either side, in words.
 
     `sign` is -1 for cycles closed over half a period, 1 for cycles closed over a whole one.
     """
@@ -113,9 +116,9 @@ class Tracer:
     ) -> Point | None:
         """Find the cycle on a plane in the space of place, log distance and log time.
 
-        The plane passes through `target` with the normal `normal`. The search starts from the cycle `near` it, or from
-        its own approximate `states` (1, states). It uses the Jacobian of the nearby cycle first, then a new one.
-        Returns None if no cycle is found.
+        The plane passes through `target` with the normal `normal`. The search starts from the cycle `near` the plane,
+        or from approximate `states` (1, states) of the cycle sought. It uses the Jacobian of the nearby cycle first,
+        then a new one. Returns None if no cycle is found.
         """
         point = self._solved(near, target, normal, states)
         if point is None and near.jacobians is not None:
@@ -192,16 +195,17 @@ class Tracer:
         return points[1:], "it was followed for as many steps as there may be"
 
     def reaches(self, points: Sequence[Point], reason: str) -> bool:
-        """Tell whether a walk ended at the farthest place on the line of keys.
+        """Tell whether a walk along a branch ended at the farthest place on the line of keys.
 
-        False if it ended at the first place, or for another reason.
+        `points` and `reason` are what the walk returned. The result is false if it ended at the first place, or for
+        another reason.
         """
         return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
-        """Return the cycle at the end of the range as a list of one; an empty list if none is found.
+        """Return the cycle at the end of the range of places, as a list of one; empty if it fails.
 
-        It lies between the last point inside the range and the first beyond.
+        `last` is the last point inside the range, and `beyond` the first point outside.
         """
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)
@@ -211,15 +215,16 @@ class Tracer:
     def _is_mirrored(self, start: Point, point: Point) -> bool:
         """Tell whether the middle of an asymmetric cycle has passed to the reference's other side.
 
-        Beyond the symmetric cycle a branch of asymmetric cycles continues as its own mirror image. The result is false
-        for stages without mirror-image motions.
+        The cycles are those at `point` and at the `start` of the branch. Beyond the symmetric cycle a branch of
+        asymmetric cycles continues as its own mirror image. The result is false for stages without mirror-image
+        motions.
         """
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         leans = float(point.cycle.middle[0] * start.cycle.middle[0])
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
     def _stop(self, point: Point) -> str:
-        """Return the reason why a branch is not followed beyond a point; "" if it is."""
+        """Return the reason why a branch is not followed beyond a point; "" if it is followed on."""
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < ContinuationSettings.current().vanished_amplitude * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
@@ -228,7 +233,7 @@ class Tracer:
         return ""
 
     def branch(self, start: Point) -> Branch:
-        """Follow the whole branch through a point, in both directions."""
+        """Follow the branch through the cycle `start`, in both directions."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 

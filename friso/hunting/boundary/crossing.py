@@ -53,7 +53,8 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
 class FoldBack(NamedTuple):
     """A fold: how far along the branch it lies, where in the key's range, and with what error.
 
-    `place` runs from 0 to 1 over the key's range, and `reserve` bounds its error.
+    `length` is along the branch, from where the curve was fitted. `place` runs from 0 to 1 over the key's range, and
+    `reserve` bounds its error.
     """
 
     length: float
@@ -82,5 +83,8 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
-    """Return the standard deviation of values, (n,), about a cubic fitted to them."""
+    """Return the standard deviation of values, (n,), about a cubic `curve` through them.
+
+    `at`, shape (n,), are the places of the values.
+    """
     return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

@@ -52,10 +52,10 @@ class Spot:
 
 @dataclass(frozen=True)
 class Curve:
-    """Curve on which cycles of one kind change their stability: its spots in order, and ends.
+    """Curve on which cycles of one kind change their stability: its spots in order.
 
     `kind` says how: by a flip, fold or torus. `sign` is -1 for cycles closed over half a period, 1 for a whole one.
-    Both ends are "closed" for a ring.
+    `ends` say in words why the curve ends on either side; both are "closed" for a ring.
     """
 
     kind: Bifurcation
@@ -85,7 +85,7 @@ class Expected:
 
     @classmethod
     def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
-        """Extrapolate a curve one step, by a parabola through three points, or a line through two."""
+        """Extrapolate a curve one step, by a parabola through its last three points or a line."""
         last = spots[-3:]
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
@@ -106,8 +106,8 @@ class CurveTracer:
     ) -> Spot | None:
         """Find the point of the curve on a line, at most `reach` from the line's `origin`.
 
-        The line has the direction `across`. The search starts from the point `near` it, or from the `expected` one.
-        Returns None if it fails.
+        The line has the direction `across`. The search starts from the known point `near` the one sought, or from the
+        `expected` one. Returns None if it fails.
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
@@ -159,7 +159,7 @@ class CurveTracer:
         return Curve(self.kind, self.sign, (*before[:1:-1], *after), (beginning, last))
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
-        """Follow a curve from two neighbouring points; return all points, and why it ends."""
+        """Follow a curve from its first points, two or more; return all points, and why it ends."""
         settings = ContinuationSettings.current()
         start, step = spots[0], settings.first_curve_step
         direction = unit_vector(spots[1].at - spots[0].at)
@@ -184,7 +184,10 @@ class CurveTracer:
         return spots, "it was followed for as many steps as there may be"
 
     def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
-        """Find where the curve leaves the box of the keys; return a list of that point, or none."""
+        """Find where the curve leaves the box of the keys; return that point in a list, or none.
+
+        The curve goes on from the last of `spots` in this `direction`, shape (2,), and leaves within a `step`.
+        """
         last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
@@ -206,7 +209,7 @@ class CurveTracer:
 
 
 def unit_vector(vector: np.ndarray) -> np.ndarray:
-    """Scale a vector to length one."""
+    """Scale a vector, shape (n,), to length one."""
     return vector / np.linalg.norm(vector)
 
 

@@ -25,7 +25,7 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class LocatedPoint:
-    """Point at which a branch loses or gains stability.
+    """Point at which a branch loses or gains stability, by a flip, a fold or a torus (`kind`).
 
     `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
     key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter
@@ -42,8 +42,8 @@ class LocatedPoint:
     def in_doubt(self, point: Point) -> bool:
         """Tell whether a cycle of the branch is so near this point that its stability is unknown.
 
-        It is if the cycle lies within the error of the special point and has almost its size. The result is false if
-        that error is not known (infinite).
+        The result is true if the cycle lies within the error of the special point and has almost its size. It is false
+        if that error is not known (infinite).
         """
         settings = ContinuationSettings.current()
         apart = np.abs(self.point.vector - point.vector)
@@ -66,7 +66,7 @@ def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
 
 
 def _complex(point: Point) -> bool:
-    """Tell whether the deciding multiplier is the modulus of a complex pair of multipliers."""
+    """Tell whether the multiplier that decides is the modulus of a complex pair."""
     leading = complex(point.cycle.local[0, 0])
     return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
@@ -87,7 +87,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
     """Return the last stable cycle on a branch before a special point between two neighbours.
 
-    It lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
+    The cycle lies within `precise` of the special point, along the branch. Returns None if a cycle on the way cannot be
     closed.
     """
     points = _enclosed(tracer, first, second, kind, precise)
@@ -107,7 +107,8 @@ def _enclosed(
 ) -> dict[float, Point] | None:
     """Search for a special point between two neighbours on a branch, to a length `precise`.
 
-    Returns all computed points by their length along the branch, or None if a cycle cannot be closed.
+    Returns all computed cycles by their length along the branch, counted from the first neighbour; None if a cycle
+    cannot be closed.
     """
     settings = ContinuationSettings.current()
     from scipy.optimize import brentq  # 0.4 s to import
@@ -152,9 +153,10 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
 def _special_point(
     tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
 ) -> LocatedPoint:
-    """Make a special point of a cycle on a branch, and compute its error.
+    """Make a special point of the cycle `point` on a branch, and compute its error.
 
-    The error is infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
+    `direction`, shape (3,), is that of the branch, and `slope` the change of the multiplier along it. The error is
+    infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
     """
     if tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
         if kind == "fold":
@@ -176,7 +178,10 @@ def _special_point(
 
 
 def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
-    """Locate a fold with a limiter that chatters, from a point with a multiplier of 1."""
+    """Locate a fold with a limiter that chatters, from a cycle `point` with a multiplier of 1.
+
+    `direction` is that of the branch. The error is infinite if the fold cannot be located.
+    """
     at = turned(tracer, point, direction)
     there = at and tracer.solve(point, point.vector + at.length * direction, direction)
     if not at or not there:
@@ -237,9 +242,9 @@ def corrected(
 ) -> LocatedPoint | None:
     """Find the special point along a direction from an origin by the secant method.
 
-    It lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log time. The
-    search starts from the cycle `near` it, its approximate `states` (1, states), and the `slope` of the multiplier if
-    known. Returns None if there is no such point.
+    The point lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log
+    time. The search starts from the cycle `near` the point, its approximate `states` (1, states), and the `slope` of
+    the multiplier if known. Returns None if there is no such point.
     """
     settings = ContinuationSettings.current()
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
@@ -274,7 +279,7 @@ def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
 def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
     """Tell whether a fold is in fact where an asymmetric branch meets the symmetric one.
 
-    There the middle of the cycle lies on the reference.
+    The middle of the cycle then lies on the reference.
     """
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]

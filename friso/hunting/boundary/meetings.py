@@ -42,8 +42,8 @@ class Meeting:
 def find_meetings(space: Space, curves: Sequence[Curve], rtol: float) -> tuple[Meeting, ...]:
     """Find where curves cross, run together or end on one another.
 
-    Crossings are refined by cycles closed to the relative tolerance `rtol`. Within a stretch that runs together, or at
-    another crossing, a further crossing or end does not count.
+    Crossings are refined by cycles closed to the relative tolerance `rtol`. A crossing or end is left out if it lies at
+    another crossing of both curves, or where they run together.
     """
     meetings: list[Meeting] = []
     for first, second in combinations(range(len(curves)), 2):
@@ -66,7 +66,10 @@ def _lies_on(place: np.ndarray, meeting: Meeting) -> bool:
 
 
 def _closed_path(curve: Curve) -> tuple[np.ndarray, list[Spot]]:
-    """Return the points of a curve, (n, 2), with their cycles; a ring repeats its first point."""
+    """Return the points of a curve, (n, 2), and its spots with their cycles.
+
+    A ring repeats its first point in both.
+    """
     again = CLOSED in curve.ends
     spots = [*curve.spots, *curve.spots[:1]] if again else [*curve.spots]
     return (np.vstack([curve.points, curve.points[:1]]) if again else curve.points), spots
@@ -83,7 +86,7 @@ class _Nearest(NamedTuple):
 
 
 def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
-    """Find what is nearest on a curve to coordinates in the box, shape (2,).
+    """Find the point of a curve nearest to coordinates in the box, shape (2,), and its cycle.
 
     The curve is straight between its points.
     """
@@ -96,9 +99,10 @@ def _nearest(curve: Curve, at: np.ndarray) -> _Nearest:
 
 
 def leg_shares(path: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return where on each leg of a path, (n, 2), the point nearest to `at`, shape (2,), lies.
+    """Return where on each leg of a path the point nearest to `at`, shape (2,), lies.
 
-    The results run from 0 at the start of a leg to 1 at its end.
+    The legs are the straight pieces between the points of the path, (n, 2). The results, (n - 1,), run from 0 at the
+    start of a leg to 1 at its end.
     """
     legs = np.diff(path, axis=0)
     return np.clip(((at - path[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
@@ -160,7 +164,7 @@ def _crossings(space: Space, curves: Sequence[Curve], numbers: tuple[int, int], 
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return cross products of vectors in the plane, along the last axis."""
+    """Return cross products, shape (...), of vectors in the plane, shape (..., 2)."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
@@ -172,10 +176,11 @@ def _refined(
     pairs: Sequence[Sequence[Spot]],
     rtol: float,
 ) -> Meeting:
-    """Refine a guessed crossing; `pairs` are the neighbouring points of each curve about it.
+    """Refine a guessed crossing of two curves by their `numbers`, or of one curve with itself.
 
-    The next guess is where the tangents of both curves cross. The first guess is returned if a cycle is lost on the
-    way. It is also returned if a limiter chatters, because one point then costs as much as many.
+    `pairs` are the two neighbouring points of each curve about it. The next guess is where the tangents of both curves
+    cross. The first guess is returned if a cycle is lost on the way. It is also returned if a limiter chatters, because
+    one point then costs as much as many.
     """
     settings, place = MeetingSettings.current(), guess
     refinements = 0 if space.stages(guess[None]).chatters else settings.crossing_refinements
@@ -216,7 +221,10 @@ def _turned(way: np.ndarray, chord: np.ndarray) -> np.ndarray:
 
 
 def _ends_on(curves: Sequence[Curve], number: int, other: int) -> Iterator[Meeting]:
-    """Find the ends of a curve inside the range that lie on another curve, with the same cycle."""
+    """Find the ends of the curve `number` that lie on the curve `other`, with the same cycle.
+
+    Ends on the sides of the box, and those of a ring, do not count.
+    """
     curve = curves[number]
     for how, spot in zip(curve.ends, (curve.spots[0], curve.spots[-1]), strict=True):
         if how not in (END_OF_RANGE, CLOSED):

@@ -127,9 +127,11 @@ CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
-    """Return the hunting cycles of stages, and the searches for curves on which they change.
+    """Return the hunting cycles of stages, and between which stages to search for curves.
 
-    A stage for which no cycle could be closed is neither inside nor outside of a curve.
+    A search names stages inside and outside of a curve. In the first, the cycle attracts inside and not outside. If
+    there is a second, an attracting cycle lies between asymmetric ones inside, and has none beside it outside. A stage
+    that may have a cycle which was not closed is on neither side.
     """
     hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain
@@ -150,7 +152,10 @@ def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
 
 
 def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Return pairs of grid neighbours, the first inside the region and the second outside."""
+    """Return pairs of grid neighbours, the first of them inside and the second outside.
+
+    `inside` and `outside`, shape (nodes, nodes), mark the nodes of the grid.
+    """
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
     for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
@@ -175,8 +180,8 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
 def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """Follow a cycle towards a neighbouring stage, to where it loses stability or folds.
 
-    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change, or None,
-    and whether the cycle reaches the neighbour unchanged.
+    `start` and `end` are the coordinates of both stages in the box of the keys. Returns the point of change (None:
+    there is none, or it could not be located), and whether the cycle reaches the neighbour unchanged.
     """
     settings = ContinuationSettings.current()
     mesh = float(np.linalg.norm(end - start))

@@ -35,13 +35,13 @@ class KeyRange:
     unit: str = ""
 
     def at(self, place: np.ndarray) -> np.ndarray:
-        """Return the values [SI] at places: `low` at place 0 and `high` at 1."""
+        """Return the values [SI] at places, in their shape: `low` at place 0 and `high` at 1."""
         if self.log:
             return self.low * (self.high / self.low) ** place
         return self.low + (self.high - self.low) * place
 
     def place(self, value: np.ndarray) -> np.ndarray:
-        """Return the places of values [SI], from 0 at `low` to 1 at `high`."""
+        """Return the places of values [SI], in their shape, from 0 at `low` to 1 at `high`."""
         if self.log:
             return np.log(value / self.low) / np.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
@@ -49,7 +49,7 @@ class KeyRange:
     def hundredth(self, place: float) -> float:
         """Return by how much the place changes where the value changes by one per cent.
 
-        If the range contains 0, it is one per cent of the larger end.
+        The value is the one at `place`. If the range contains 0, one per cent of the larger end is used instead.
         """
         if self.log:
             return float(np.log(1.01) / abs(np.log(self.high / self.low)))
@@ -60,7 +60,10 @@ class KeyRange:
 
 @dataclass(frozen=True)
 class Space:
-    """Stages with one key varied, or several, over their ranges."""
+    """Stages with one key varied, or several, over their ranges.
+
+    `flat` makes the keys [SI] of stages from values of the varied keys.
+    """
 
     ranges: tuple[KeyRange, ...]
     flat: FlatAt
@@ -82,8 +85,8 @@ class Space:
     def form(self) -> Structure:
         """Return the structure shared by all stages in the box.
 
-        It is taken from a stage at which no key is zero or a whole number. Simpler stages, with a stroke of zero or a
-        whole exponent, use it too.
+        The structure is that of a stage at which no key is zero or a whole number. Simpler stages, with a stroke of
+        zero or a whole exponent, use it too.
         """
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 

@@ -43,8 +43,8 @@ DISTINCT_CRITERION = f"{PEAK_CRITERION}; of maxima with valleys of {1e6 * DISTIN
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Mark the counted peaks among turning points or samples, shape (runs, room).
 
-    Sums over rows are the counts. `times` [s] and `values` [m] of position minus reference have the shape (runs, room)
-    and are valid up to `counts`, shape (runs,).
+    The sum over a row is the peak count of its run. `times` [s] and `values` [m] of position minus reference have the
+    shape (runs, room). The number of valid entries in each row is in `counts`, shape (runs,).
     """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).peaks
@@ -53,8 +53,8 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Mark the distinct peaks, shape (runs, room).
 
-    They are counted peaks with valleys at least `DISTINCT` deep on both sides. `times` [s] and `values` [m] of
-    position minus reference have the shape (runs, room) and are valid up to `counts`, shape (runs,).
+    They are counted peaks with valleys at least `DISTINCT` deep on both sides. `times` [s] and `values` [m] of position
+    minus reference have the shape (runs, room). The number of valid entries in each row is in `counts`, shape (runs,).
     """
     nothing = np.zeros(len(counts))
     return scan_turning_points(times, values, counts, nothing, nothing).distinct
@@ -74,7 +74,7 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:
-    """Count each row's samples up to the end of its last fall by `DISTINCT`; 0 for no fall."""
+    """Count each row's samples up to the end of its last fall by `DISTINCT`, (runs,), or 0."""
     ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
     falls = values - ahead >= DISTINCT
     last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)

@@ -66,7 +66,7 @@ class End:
 def lasts(
     swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING
 ) -> np.ndarray:
-    """Return which runs still swing by more than twice the `band` [m] without decaying.
+    """Return which runs still swing by more than twice the `band` [m] without decaying, (runs,).
 
     The peak-to-peak `swing` [m] must also be at least `lasting` times the `earlier` one [m]. Pass 0 as `earlier` for a
     run long enough for any transient to decay.

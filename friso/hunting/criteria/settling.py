@@ -40,7 +40,8 @@ def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> 
 def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
     """Return settling times [s] at the places that the reference leaves, and at its last place.
 
-    The first of both arrays has the longest time over all places that the reference leaves.
+    Both arrays have the shape (runs,). The first has the longest time over all places that the reference leaves. A time
+    is infinite for a run that is outside its `band` when the reference leaves or the run ends.
     """
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     in_the_end = _since(stands(flat)[-1], np.where(last < runs.statistic("ended"), last, np.inf))

@@ -40,9 +40,9 @@ def verdicts(
 ) -> np.ndarray:
     """Return the verdict on every stage; all arrays have the shape (count,).
 
-    `completed`: the run of the stage's own motion. `decided`: the following arguments are certain. `attracts`: the
-    stage has a stable limit cycle. `ends_in_cycle`, used where it has one, and `rests`, used where it has none,
-    describe the end of the stage's own motion.
+    `completed` is true if the run of the stage's own motion was, and `decided` if the following arguments are certain.
+    `attracts` is true if the stage has a stable limit cycle. The end of its own motion is described by `ends_in_cycle`
+    if it has one, else by `rests`.
     """
     hunting = np.where(ends_in_cycle, "hunts", "bistable")
     free = np.where(rests, "settles", "transient")

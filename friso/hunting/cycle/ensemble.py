@@ -101,8 +101,9 @@ class Ensemble:
     def number(self, name: str) -> np.ndarray:
         """Return a quantity of every stage, shape (count,), by its `name` among compiled functions.
 
-        "rate" [1/s] is the natural frequency of mass and loop, and "breakaway" [N] the largest friction force at rest.
-        "stiffness" [N/m] is the proportional stiffness of the loop.
+        "rate" [1/s] is the natural frequency of mass and loop, and "stiffness" [N/m] the proportional stiffness of the
+        loop. "breakaway" [N] is the largest force of the controller at which nothing moves: friction at rest, and with
+        a backlash the force at half of it.
         """
         (value,) = getattr(self.kernel.module, name)(self.values)
         return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
@@ -116,7 +117,7 @@ class Ensemble:
     def friction_at_rest(self) -> np.ndarray:
         """Return the friction force at rest [N], the mean of both directions, (count,).
 
-        It is the break-away force less the controller's force at half a backlash, which moves nothing.
+        It is the break-away force less the controller's force at half the backlash, which friction does not hold.
         """
         return self.number("breakaway") - self.number("stiffness") * self.backlash / 2
 
@@ -155,7 +156,7 @@ class Ensemble:
         return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the states of stages at rest with a displacement [m].
+        """Return the states of stages at rest with a displacement [m], (count, states).
 
         Filters have followed the displacement; everything else is zero.
         """
@@ -163,9 +164,9 @@ class Ensemble:
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """Return the integrator state [s] at which a displaced stage's actuator relaxes, (count,).
+        """Return the integrator state per displacement [s] that relaxes the actuator, (count,).
 
-        It is given per displacement. The actuator then exerts the force that it exerts at the reference.
+        With this state, the actuator of a displaced stage exerts the force that it exerts at the reference.
         """
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
 
@@ -226,8 +227,8 @@ class Ensemble:
         """Run each stage from its state in `starts` for its duration [s].
 
         A run begins in the modes with memory that belong to its state. The `ends` of the result are states alone, or
-        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too. With
-        `along`, they lead to a motion in which these keys differ, by differences that stand in `flat` (see
+        with the modes if `with_modes`. With `variational`, small deviations from the run are integrated too. With keys
+        `along`, these deviations lead to a motion in which the keys differ, by differences that stand in `flat` (see
         `KernelRequest`). Turning points are kept only with `least_swing`, because a limiter that chatters makes too
         many. `run_options` are fields of `RunOptions`.
         """

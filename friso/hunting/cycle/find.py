@@ -34,7 +34,7 @@ UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
 
 
 def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
-    """Return the time [s] in which a deviation from a cycle changes by the factor e.
+    """Return the time [s] in which a deviation from a cycle changes by the factor e, (count,).
 
     The `multiplier` acts once per time `returned` [s].
     """
@@ -122,7 +122,10 @@ def find_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
 
 
 def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
-    """Join the cycles of groups of stages, each given with the numbers of its stages."""
+    """Join the cycles of several groups of stages into one object, in the order of the stages.
+
+    `parts` has, for each group, the numbers of its stages and their cycles.
+    """
     if len(parts) == 1:
         return parts[0][1]
     order = np.argsort(np.concatenate([which for which, _ in parts]))

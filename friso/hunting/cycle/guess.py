@@ -50,11 +50,11 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
 
 
 def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
-    """Guess the cycle over a whole period: a distance that recurs after two landings.
+    """Guess the cycle over a whole period: a sticking distance that recurs after two swings.
 
-    The distance on the other side differs by a fraction of at least `apart`. Of several guesses, the one with the
-    smallest difference is taken if `apart` is 0, else the one with the largest. `positive` and `negative` are the maps
-    of stages that stick on the positive and on the negative side.
+    After one swing the stage sticks on the other side, at a distance that differs by a fraction of more than `apart`.
+    Of several guesses, the one with the smallest difference is taken if `apart` is 0, else the one with the largest.
+    `positive` and `negative` are the return maps of stages that stick on the positive and on the negative side.
     """
     settings = OrbitSettings.current()
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
@@ -74,12 +74,12 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
-    """Return the distance, among those numbered `goes`, that recurs after two landings.
+    """Return a sticking distance [m] that recurs after two swings; None if there is none.
 
-    From the distances `start` a stage lands at `far`, and then at `end` [m], each of shape (points,). If no distance
-    recurs, the one that almost does is taken: near a fold both fixed points lie between two points of the map. With
-    `apart`, distances near the symmetric fixed point are left out, because the map almost returns there whenever a flip
-    is near. Returns None without a guess.
+    From the distances `start` a stage swings to stick at `far`, and then at `end` [m], each of shape (points,). Only
+    the distances numbered `goes` count. If none recurs, the one that almost does is taken: near a fold both fixed
+    points lie between two points of the map. With `apart`, distances near the symmetric fixed point are left out,
+    because the map almost returns there whenever a flip is near.
     """
     rise, side = end - start, np.zeros(len(start) + 1)
     side[goes] = np.sign(far - start)[goes] if apart else 1.0

@@ -45,8 +45,8 @@ def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndar
 def _returns(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Measure how far stages swing [m] when started beside their orbits, (count, runs, returns).
 
-    Runs first start evenly over a range about the orbit. More runs follow where, on either side, the next return leaves
-    the range.
+    Starts are displaced along `direction`, shape (count, states). They are first spread evenly over a range about the
+    orbit. On either side, more starts are added where the next return begins to leave the range.
     """
     settings = OrbitSettings.current()
     away = np.linspace(-settings.held_range_share, settings.held_range_share, settings.held_runs)

@@ -186,8 +186,8 @@ class Hunting:
     def passing(self) -> bool:
         """Tell whether an observed swing may be transient, growing or slowly decaying.
 
-        That is possible with a force limit without anti-windup. The size of the swing is then only the size at which
-        the run was stopped.
+        The result is true for any observed swing with a force limit without anti-windup. The size of the swing is then
+        only the size at which the run was stopped.
         """
         return self.lower_gains is not None and bool(self.observed)
 
@@ -261,8 +261,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
     """Return for which stages it is certain what attracts them, shape (count,).
 
-    It is certain if the survey decided, and nothing can attract beyond its reach. Stages that cannot hunt are not
-    surveyed (None), and are certain if no other swing lasts.
+    For a stage this is certain if the survey decided, and nothing can attract beyond the survey's reach. Stages that
+    cannot hunt are not surveyed (None), and are certain if no other swing lasts.
     """
     if survey is None:
         return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)

@@ -36,8 +36,8 @@ class Multipliers:
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     """Compute the multipliers of closed orbits, one orbit per stage.
 
-    Runs have the relative tolerance `rtol`. Multipliers belong to half a period if the orbits were closed over half a
-    period.
+    Runs have the relative tolerance `rtol`. The multipliers are growth factors over half a period if the orbits were
+    closed over half a period, else over a whole one.
     """
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)

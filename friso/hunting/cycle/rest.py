@@ -1,4 +1,4 @@
-"""Make states of stages stuck away from their reference, from which hunting starts."""
+"""Make states of stages at rest or stuck off their reference, from which hunting starts."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
-    """Return states of stages at their reference that move at a velocity [m/s].
+    """Return states of stages at their reference that move at a velocity [m/s], (count, states).
 
     All masses move alike, and everything else is zero.
     """

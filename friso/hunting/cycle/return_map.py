@@ -1,6 +1,6 @@
 """Compute the return map of hunting.
 
-It takes the sticking distance to how far a stage swings to the other side.
+The map takes the distance at which a stage sticks to how far it then swings to the other side.
 """
 
 from __future__ import annotations

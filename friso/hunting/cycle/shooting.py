@@ -1,6 +1,7 @@
 """Close periodic orbits by Newton's method.
 
-Each run covers a period, or half a period, after which it must have reached the mirror image of its start.
+After a run over a whole period, an orbit must be back at its start. After half a period it must be at the mirror image
+of its start.
 """
 
 from __future__ import annotations
@@ -55,9 +56,9 @@ class Orbits(ArrayRows):
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
     """Integrate orbits from states (count, states) for times [s] (count,), with derivatives.
 
-    One deviation runs along each state but the one with the largest rate: that derivative follows from the others,
-    because the flow carries the rates at the start to those at the end. With modes that remember, a state alone does
-    not give the rates, so all deviations are run.
+    `sign` is -1 for half a period, after which the ends are mirrored. One deviation runs along each state but the one
+    with the largest rate: that derivative follows from the others, because the flow carries the rates at the start to
+    those at the end. With modes that remember, a state alone does not give the rates, so all deviations are run.
     """
     count, size = states.shape
     rows, before = np.arange(count)[:, None], stages.rates(states)
@@ -209,15 +210,15 @@ class _Shooting:
         return bool(self.active.any())
 
     def _refine(self) -> None:
-        """Let fine runs go on where rough ones have nearly closed an orbit."""
+        """Let accurate runs replace rough ones that have nearly closed an orbit."""
         near = self.rough & (self.gaps < OrbitSettings.current().rough_gap)
         self.rough[near], self.active[near] = False, True
         self.gaps[near], self.idle[near] = np.inf, 0
 
     def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
-        """Take one step of the orbits numbered `which`, with a new Jacobian or with the last one.
+        """Take one Newton step of the orbits numbered `which`, with runs to the tolerance `rtol`.
 
-        Runs have the relative tolerance `rtol`.
+        With `renew` a new Jacobian is computed, otherwise the last one is used again.
         """
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
@@ -243,7 +244,8 @@ class _Shooting:
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
         """Return derivatives of the closing errors and the phase error by states and time.
 
-        The shape is (orbits, states + 1, states + 1).
+        They are for the orbits numbered `which`, just integrated as `shot`, in the shape (orbits, states + 1, states +
+        1).
         """
         count, size = shot.ends.shape
         jacobians = np.zeros((count, size + 1, size + 1))
@@ -258,7 +260,10 @@ class _Shooting:
         return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Store orbits that are closer to closing than before; stop those that close, fail or stall."""
+        """Store orbits that are closer to closing than before; stop those that close, fail or stall.
+
+        `gaps`, shape (orbits,), are the errors of closing of the orbits numbered `which`.
+        """
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
         for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
@@ -351,7 +356,7 @@ class _Following(_Shooting):
         return step
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        """Store the best orbits so far with their Jacobians."""
+        """Store the best orbits so far with their Jacobians; `gaps` are the errors of closing."""
         if not self.chatters:
             better = which[gaps < self.gaps[which]]
             self.best_jacobians[better] = self.jacobians[better]
@@ -387,7 +392,7 @@ class _Following(_Shooting):
     def _beside(self, which: np.ndarray) -> np.ndarray:
         """Run orbits with their stages moved slightly back and ahead along the lines of keys.
 
-        Returns the ends and the phase errors, shape (2, orbits, states + 1).
+        Returns the final states and the phase error of each run, shape (2, orbits, states + 1).
         """
         settings = OrbitSettings.current()
         both = np.concatenate([which, which])
@@ -397,7 +402,7 @@ class _Following(_Shooting):
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """Return the phase errors of orbits, and their distances from the borders."""
+        """Return the phase errors of orbits and their distances from the borders, (orbits, 2)."""
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
         where = np.stack([self.places[which], *np.log(sizes)], axis=1)
         residual = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
@@ -413,7 +418,7 @@ def _iterated(shooting: _S) -> _S:
 
 
 def _inverse(jacobian: np.ndarray) -> np.ndarray:
-    """Invert a matrix; return NaN if it is singular."""
+    """Invert a matrix, shape (n, n); return NaN if it is singular."""
     try:
         return np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:

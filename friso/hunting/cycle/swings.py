@@ -13,7 +13,10 @@ from friso.hunting.cycle.settings import OrbitSettings
 
 @dataclass(frozen=True)
 class Swings:
-    """First swings of runs, (runs, swings): turning points [m] and times [s], then NaN."""
+    """First swings of runs: turning points `values` [m] and their `times` [s], (runs, swings).
+
+    Entries after the last swing are NaN.
+    """
 
     values: np.ndarray
     times: np.ndarray
@@ -57,7 +60,8 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
     """Find the turning points of zigzags whose legs are at least `least` [m] long, (runs,).
 
-    `values` [m] and `times` [s] have the shape (runs, points). `side` is 1 or -1 for runs that start on that side.
+    At most `most` are returned for each run, after the first. `values` [m] and `times` [s] have the shape (runs,
+    points). `side` is 1 or -1 for runs that start on that side.
     """
     runs = len(values)
     rows = np.arange(runs)

@@ -129,7 +129,7 @@ def _swings(attractor: MapAttractor) -> int:
 
 
 def _proposals(mapped: Mapped) -> list[_Proposal]:
-    """Return the attractors of all maps, each with the run near it that can be continued.
+    """Return the attractors of all maps, each with the run that will be continued near it.
 
     Of the runs that lead to an attractor, the one that ended nearest to it is taken. Attractors without such a run are
     left out.
@@ -150,9 +150,9 @@ def _proposals(mapped: Mapped) -> list[_Proposal]:
 
 
 def is_motion(attractor: MapAttractor, motion: Swinging, length: float, exactly: bool = False) -> bool:
-    """Tell whether an attractor of a map is a given closed cycle of its stage.
+    """Tell whether the attractor of a map is the closed cycle `motion` of its stage.
 
-    They are compared by size, and by how often the stage sticks until they repeat. With `exactly`, these numbers must
+    Both are compared by size, and by how often the stage sticks until they repeat. With `exactly`, these numbers must
     be equal; otherwise one may be a multiple of the other. `length` [m] is the deflection of the loop by the break-away
     force.
     """
@@ -197,8 +197,8 @@ def _close(mapped: Mapped, runs: np.ndarray, rtol: float, motions: list[Swinging
 def _repeats(path: np.ndarray, symmetric: bool, least: int) -> int:
     """Return after how many swings a run's last landings repeat; 0 if they do not.
 
-    At least `least` swings are asked for. `path`, shape (landings,), has the signed landings; those of a `symmetric`
-    stage may repeat on the other side.
+    Repetitions after fewer than `least` swings do not count. `path`, shape (landings,), has the signed landings; those
+    of a `symmetric` stage may repeat on the other side.
     """
     settings = ReturnMapSettings.current()
     sizes = np.abs(path) if symmetric else path

@@ -34,9 +34,9 @@ def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
 
 
 def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
-    """Choose distances at which runs of a stage stick at first, to check its map.
+    """Choose distances at which runs of a stage begin stuck, to check its map, shape (runs,).
 
-    They are in deflections of the loop by the break-away force, shape (runs,).
+    They are in deflections of the loop by the break-away force.
     """
     mapped = survey.mapped
     runs = np.flatnonzero((mapped.owners == stage) & np.isfinite(mapped.starts))
@@ -57,8 +57,8 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 def _land_as_foretold(survey: MapSurvey, owners: np.ndarray, starts: np.ndarray, rtol: float) -> np.ndarray:
     """Return which runs land where the maps of their stages predict, shape (runs,).
 
-    `owners` are the numbers of their stages. They stick at first at `starts`, in deflections of the loop by the
-    break-away force.
+    `owners` are the numbers of the runs' stages in the `survey`. Runs begin stuck at `starts`, in deflections of the
+    loop by the break-away force.
     """
     settings = ReturnMapSettings.current()
     survey_settings = SurveySettings.current()

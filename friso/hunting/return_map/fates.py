@@ -25,9 +25,9 @@ def motions_go_on(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which motions of one stage swing for ever, and which are certain, both (count,).
 
-    `flat` has the stage's keys in SI, and arrays (count,) where motions differ. Motions may also begin at the reference
-    from initial states, `starts` (count, states). The result is uncertain if the reference does not come back to its
-    start.
+    `landing_map` is the stage's return map. `flat` has its keys in SI, and arrays (count,) where motions differ.
+    Motions may also begin at the reference from initial states, `starts` (count, states). The result is uncertain if
+    the reference does not come back to its start.
     """
     if starts is not None:
         return _go_on(Ensemble.held(flat, count), starts, landing_map)

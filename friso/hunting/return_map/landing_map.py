@@ -65,7 +65,7 @@ class LandingMap:
         """Make the map from the landings of runs of one stage: where it sticks after each swing.
 
         The starts are left out, because the landing after a start depends on how the run began. `length` [m] is the
-        deflection of the loop by the break-away force.
+        deflection of the loop by the break-away force. If the stage is `symmetric`, distances lose their signs.
         """
         settings = SurveySettings.current()
         distances = landings.distances / length
@@ -85,7 +85,7 @@ class LandingMap:
         return cls(before[order], after[order], run[order], final[order], symmetric, lost)
 
     def renumbered(self, runs: np.ndarray) -> LandingMap:
-        """Return the map with new numbers for its runs: `runs`, shape (runs,), has them."""
+        """Return the map with its runs renumbered: run k gets the number `runs[k]`."""
         return replace(self, run=runs[self.run])
 
     @property
@@ -161,7 +161,7 @@ class LandingMap:
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
-        """Return the map's attractors, in which a stage swings for ever; any point may lead there."""
+        """Return the map's attractors, in which a stage swings for ever, from any of its points."""
         goes = np.isfinite(self.after) & (self.after != 0)
         at = np.where(goes, _place(np.where(goes, self.after, 1.0)), REST)
         return tuple(self._told_apart(self._followed(at)))
@@ -198,7 +198,10 @@ class LandingMap:
         return paths
 
     def foretold(self, distances: np.ndarray) -> np.ndarray:
-        """Predict the signed distances of the next landings, (count,); 0 for coming to rest."""
+        """Predict the landings that follow landings at signed distances, (count,); 0 for rest.
+
+        All distances are in the unit of the map, deflections of the loop by the break-away force.
+        """
         return _distance(self.next(self._places(distances)))
 
     def goes_on(self, distances: np.ndarray) -> np.ndarray:
@@ -242,9 +245,9 @@ class LandingMap:
     def scatter(self) -> tuple[float, float]:
         """Return the largest relative error of a landing predicted by neighbours, and where it is.
 
-        The place is a signed distance. The error is infinite if a stage rests between two landings that continue alike,
-        or the reverse. It is 0, and the place NaN, if no three points are close together. Only points whose next
-        landing is at more than half of their distance count.
+        The place is a signed distance. The error is infinite if a stage comes to rest after one landing but swings on
+        alike after both neighbours of it, or the reverse. It is 0, and the place NaN, if no three points are close
+        together. Only points whose next landing is at more than half of their distance count.
         """
         settings = ReturnMapSettings.current()
         worst, place = 0.0, np.nan
@@ -269,7 +272,7 @@ class LandingMap:
 
 
 def _place(distances: np.ndarray) -> np.ndarray:
-    """Return coordinates on the map: logarithms of distances, shifted on the negative side."""
+    """Return coordinates on the map: logarithms of distances, shifted where they are negative."""
     return np.log(np.abs(distances)) + OTHER_SIDE * (distances < 0)
 
 
@@ -323,7 +326,7 @@ def _repeats_after(path: np.ndarray, symmetric: bool) -> int:
 def _mixed(paths: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return which paths are on the irregular attractor of the path `first`, shape (points,).
 
-    They are if they spread over the same range.
+    Paths are on it if they spread over the same range.
     """
     settings = ReturnMapSettings.current()
     return (paths.min(axis=1) > first.min() - 10 * settings.same_attractor_share) & (

@@ -109,9 +109,9 @@ def find_landings(stages: Ensemble, starts: np.ndarray, most: int, rtol: float =
 def _landings(values: np.ndarray, times: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find the landings of runs: the farthest turning points [m] on alternating sides.
 
-    Returns where they are, their times [s], and their number. Positions and times have the shape (runs, landings), the
-    start first; the number excludes the start, (runs,). `values` and `times` have the shape (runs, points), NaN for
-    none.
+    Returns where they are, their times [s], and their number, at most `most`. Positions and times have the shape (runs,
+    most + 1), the start first; the number excludes the start, (runs,). `values` and `times` have the shape (runs,
+    points), NaN for none.
     """
     count = len(values)
     rows = np.arange(count)

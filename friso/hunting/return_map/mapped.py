@@ -66,14 +66,17 @@ class Mapped:
         return np.array([bool(landing_map.attractors) for landing_map in self.maps], bool)
 
     def take(self, numbers: np.ndarray) -> Mapped:
-        """Select the stages with these numbers, each once, and their runs."""
+        """Select the stages with these numbers, none of them twice, and their runs."""
         which = np.flatnonzero(np.isin(self.owners, numbers))
         owners = np.array([np.flatnonzero(numbers == owner)[0] for owner in self.owners[which]], np.int64)
         runs = (self.starts[which], self.continued[which], self.landings.take(which))
         return Mapped(self.stages.take(numbers), owners, *runs, self.rtol)
 
     def joined(self, owners: np.ndarray, starts: np.ndarray, landings: Landings) -> Mapped:
-        """Add runs that have landed already; `owners`, shape (runs,), number their stages."""
+        """Add runs that have landed already; `owners`, shape (runs,), number their stages.
+
+        `starts`, shape (runs,), are where they stuck at first, in deflections of the loop by the break-away force.
+        """
         together = self.landings.joined(landings)
         joined = Mapped(
             self.stages,
@@ -90,9 +93,10 @@ class Mapped:
         return joined
 
     def begun(self, owners: np.ndarray, starts: np.ndarray, most: int | None = None) -> Mapped:
-        """Add runs that stick at first at `starts`; `owners` number their stages, both (runs,).
+        """Add runs that begin stuck at `starts`; `owners` number their stages, both (runs,).
 
-        Each lands at most `most` times.
+        Starts are signed, in deflections of the loop by the break-away force. A run lands at most `most` times (None:
+        as the settings say).
         """
         most = ReturnMapSettings.current().run_landings if most is None else most
         return self.joined(owners, starts, _stuck_at(self.stages, owners, starts, most, self.rtol))
@@ -117,7 +121,7 @@ class Mapped:
         return self.begun(owners, np.concatenate(wanted)) if owners.size else self
 
     def _wanted(self, stage: int) -> np.ndarray:
-        """Choose starts for more runs of a stage, so that points fill gaps in its map."""
+        """Choose starts for more runs of a stage, so that points fill gaps in its map, (n,)."""
         landing_map, starts = self.maps[stage], []
         which = np.flatnonzero((self.owners == stage) & np.isfinite(self.starts))
         which = which[np.argsort(self.starts[which], kind="stable")]
@@ -141,7 +145,8 @@ def map_stages(
 ) -> Mapped:
     """Sample the return maps of stages by runs stuck `near` their reference, and farther off.
 
-    Runs are added in `rounds` where a map is too coarse. A `sparse` map has every third of the farther starts only.
+    Distances are in deflections of the loop by the break-away force. Up to `rounds` times, runs are added where a map
+    is too coarse. A `sparse` map has every third of the farther starts only.
     """
     settings = ReturnMapSettings.current()
     limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
@@ -182,9 +187,10 @@ def remembered(mapped: Mapped, stage: int) -> str:
 
 
 def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: int, rtol: float) -> Landings:
-    """Return the landings of runs that stick at first at `starts`, at most `most` of each run.
+    """Return the landings of runs that begin stuck at `starts`, at most `most` of each run.
 
-    `owners` are the numbers of their stages. Both have the shape (runs,).
+    `owners` are the numbers of their stages. Both have the shape (runs,). Starts are in deflections of the loop by the
+    break-away force.
     """
     several = stages.take(owners)
     return find_landings(several, stuck(several, starts * several.length), most, rtol)
@@ -193,7 +199,7 @@ def _stuck_at(stages: Ensemble, owners: np.ndarray, starts: np.ndarray, most: in
 def gaps(landing_map: LandingMap) -> np.ndarray:
     """Return the distances at which the map needs a further point, the widest gap first.
 
-    Each lies in the middle of a gap that is too wide, with the sign of its side.
+    A distance lies in the middle of a gap that is too wide, in the unit of the map and with the sign of its side.
     """
     settings = ReturnMapSettings.current()
     places, excess = [], []
@@ -225,8 +231,8 @@ def gaps(landing_map: LandingMap) -> np.ndarray:
 def unclosed(landing_map: LandingMap) -> list[int]:
     """Return the runs of a map's outermost points, where the map must be extended beyond them.
 
-    It must be if the next landing from the nearest or farthest point is not much nearer to the reference. The result
-    has the numbers of those runs, and is empty if there are none.
+    It must be extended if, from the nearest or farthest point, the next landing is not much nearer to the reference.
+    The result has the numbers of those runs, and is empty if there are none.
     """
     settings = ReturnMapSettings.current()
     runs = []
@@ -239,10 +245,9 @@ def unclosed(landing_map: LandingMap) -> list[int]:
 
 
 def _beside(starts: np.ndarray, numbers: np.ndarray, runs: list[int]) -> list[float]:
-    """Return starts between those of some runs and their neighbours, half-way in the logarithm.
+    """Return starts half-way, in the logarithm, between some `runs` and their neighbours.
 
-    `starts` ascend; `numbers` are their runs, and `runs` the numbers of the runs in question. Neighbours lie on the
-    same side of the reference.
+    `starts` ascend; `numbers` are the numbers of their runs. Only neighbours on the same side of the reference count.
     """
     between = []
     for run in runs:
@@ -273,10 +278,10 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
 
 
 def _start_that_lands(starts: np.ndarray, seen: np.ndarray, place: float) -> float | None:
-    """Return a start whose run should land at the distance `place`, or None.
+    """Return a start whose run should land at the distance `place`; None if there is none.
 
-    It lies between two neighbouring starts whose runs land nearer and farther. `starts` (runs,) ascend; `seen` (runs,
-    landings) are landings with the start first.
+    It lies between two neighbouring starts, of which one run lands nearer than `place` and the other farther. `starts`
+    (runs,) ascend; `seen` (runs, landings) are landings with the start first.
     """
     best, start = np.inf, None
     for k in range(1, ReturnMapSettings.current().run_landings):
