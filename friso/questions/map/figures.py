@@ -39,7 +39,7 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
     if SAMPLE in runs.dims:
         panels, caption = _samples(axes, colouring, marker)
     elif len(axes) == 1:
-        panels = [_line(axes[0], colouring, marker)]
+        panels = [_line(axes[0], colouring)]
     elif len(axes) == 2:
         panels = [_cells(axes[0], axes[1], colouring, marker, "")]
     else:
@@ -190,10 +190,10 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
     return f"Not shown: {axis.quantity} {listed}."
 
 
-def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
+def _line(x: CellAxis, colouring: Look) -> Panel:
     """Draw a map with a single axis as a line, with patches where the variable has no number.
 
-    A variable of words becomes rows of points. A `marker` is not drawn.
+    A variable of words becomes rows of points.
     """
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
     occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
