@@ -28,10 +28,10 @@ def along(name: str) -> str:
 
 
 def variational(model: Model, keys: Sequence[str] = ()) -> Model:
-    """Return the model extended by a small deviation of each state; the states come first.
+    """Return the model extended by a small deviation of each state, after the states.
 
-    The deviations do not influence the step size. With `keys`, they are sensitivities: they lead to a neighbouring
-    motion in which each of these keys differs by its parameter `along`.
+    Deviations do not influence the step size. They are those of a neighbouring motion with other initial states and,
+    with `keys`, with other values of these keys: key k differs by the new parameter `along(k)`.
     """
     beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     small = beside | {key(name): key(along(name)) for name in keys}

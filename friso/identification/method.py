@@ -248,7 +248,10 @@ def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
 
 
 def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
-    """List notes of the kinds of experiment on their results, for the engineer."""
+    """List what each kind of experiment notes on its own results, for the engineer.
+
+    `base` is the prior stage, if the user gave one.
+    """
     results: dict[str, list[Any]] = {}
     for experiment in experiments:
         results.setdefault(experiment.kind, []).append(experiment.result)

@@ -32,7 +32,8 @@ def image_files(
 ) -> dict[str, Content]:
     """Return the files of a figure in some formats, with names that begin with `stem`.
 
-    `shown` are images of the figure that a page will show; they are drawn beforehand, too.
+    Other processes, if there are any, begin to draw them at once. They also draw `shown`, images of the figure that a
+    page will need; these are not returned.
     """
     forms = [*forms]
     draw_beforehand([figure], [*shown, *map(Image, forms)])

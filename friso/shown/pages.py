@@ -53,8 +53,8 @@ class Report:
     """The page of a `command`: name, figures, stage file, and contents by name.
 
     `values` holds the contents named in `CONTENTS`, and what the command's own template names. That template, if there
-    is one, stands in the folder templates of the package `templates`. It extends `page.html` and changes its blocks:
-    answer, table, figures, footer. Pages that are `scripted` load plotly even without figures.
+    is one, is the file templates/COMMAND.html in the package that the field `templates` names. It extends `page.html`
+    and changes its blocks: answer, table, figures, footer. Pages that are `scripted` load plotly even without figures.
     """
 
     command: str

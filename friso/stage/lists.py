@@ -72,9 +72,10 @@ class Several:
         return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
 
     def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
-        """Return the values of an array, each read by `read_one`, or else as one value of the key.
+        """Return the values of an array, or with `alone` of a single value, too.
 
-        Raises InputError, under the number of the wrong element.
+        Each element is read by `read_one`, by default as `of` reads it. Raises InputError for a wrong length or a wrong
+        element, whose number it names.
         """
         if self.alone and not isinstance(raw, list | tuple):
             raw = [raw]

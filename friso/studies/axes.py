@@ -189,9 +189,9 @@ def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):
+        if "," not in values:
+            raise InputError("", quoted(values), "a range FIRST..LAST, or a list of values with commas", RANGE_EXAMPLE)
         si = np.array([reader.text(value) for value in values.split(",")])
-        if len(si) < 2:
-            raise InputError("", quoted(values, "one point"), "a range or a list of 2 points or more", RANGE_EXAMPLE)
     else:
         si = np.array([reader.text(value) for value in _items(values)], dtype=float)
     if si.ndim != 1 or not si.size:

@@ -67,9 +67,10 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 
 
 def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
-    """Check the attributes of a store that count verified cells; others may have written them.
+    """Check the counts of verified cells in the attributes of a store.
 
-    Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study with `cells` cells.
+    Another program may have written them. Raises ValueError, TypeError or KeyError for counts or a tolerance that
+    `verify_cells` cannot have written for a study with `cells` cells.
     """
     for checked, same in (("verified_cells", "verified_surviving"), ("inferred_checked", "inferred_confirmed")):
         if checked in attributes and not 0 <= index(attributes[same]) <= index(attributes[checked]) <= cells:

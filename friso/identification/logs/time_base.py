@@ -188,7 +188,7 @@ def _rounded(raw: Track, even: np.ndarray) -> float:
 
 
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
-    """Bring all tracks to the instants of the coarsest one that all of them cover.
+    """Bring all tracks to the instants of the coarsest, as far as all cover them.
 
     Returns the common instants as a track, and the values by name. Finer tracks are interpolated linearly within their
     own segments. Raises LogError if the tracks have no time in common.

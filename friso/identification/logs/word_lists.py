@@ -16,7 +16,10 @@ def read_lists(name: str) -> dict[str, Any]:
 
 @cache
 def channel_words() -> dict[str, Any]:
-    """Return the words in names of channels; the lists of all languages are joined to sets."""
+    """Return the words in a channel's name that tell what it is, from names.toml.
+
+    Keys are the tables of that file, nested as there. Values are sets of words, all languages together.
+    """
     return _joined(read_lists("names"))
 
 

@@ -105,9 +105,9 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
 def edge_of_hunting(runs: xr.Dataset, metric: str, x: CellAxis, y: CellAxis) -> tuple[Series, ...]:
     """Return the curve that separates cells in which hunting attracts from the others.
 
-    `metric` is the variable of `runs` that is mapped; only one of verdicts has such a curve. Undecided cells are left
-    out. The result is empty for any other variable, for an axis with words or a single cell, and if all cells are on
-    one side.
+    `metric` is the variable of `runs` that is mapped; it has such a curve only if its values are verdicts. Undecided
+    cells are left out. The result is empty for any other variable, for an axis with words or a single cell, and if
+    all cells are on one side.
     """
     colouring = look(runs, metric)
     codes = np.asarray(colouring.codes.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]

@@ -16,7 +16,7 @@ TITLE = "Conclusions of the thesis under each friction law"
 def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
     """Say how many conclusions survive other friction laws, and which do not.
 
-    Laws that match too little of the measured friction to say are named.
+    Laws under which nothing was judged are named, each with the measured friction that it does not match.
     """
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
     others = ", ".join(laws.laws[1:])

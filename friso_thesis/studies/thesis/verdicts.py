@@ -60,10 +60,10 @@ class ClaimVerdict:
 
     @property
     def robust(self) -> bool:
-        """Tell whether a claim fails for every plausible choice of what the thesis leaves open.
+        """Tell whether a claim fails for every plausible choice of what is left open.
 
-        The claim must hold in no draw of the open values, and at most in the fraction `ROBUST` by the 95 % interval. No
-        assumption outside the draws may decide on it.
+        The claim holds in no draw of the open values, and there are enough draws: the upper end of the 95 % interval of
+        the fraction in which it holds is at most `ROBUST`. No assumption outside the draws decides on it.
         """
         fails = self.judgement in ("holds in part", "differs")
         return bool(fails and self.space and not self.undrawn and self.space.holds.high <= ROBUST)

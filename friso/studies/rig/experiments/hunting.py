@@ -122,9 +122,10 @@ class HuntingResult:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Run the move at all crossovers on all rails, and releases with the joint locked.
+    """Run the move at all crossovers on all rails, with the joint locked and free.
 
-    Raises InputError for a stage without joint, or a motion that does not move it.
+    With the joint locked, the stage is also let go at several distances from its reference. Raises InputError for a
+    stage without joint, or a motion that does not move it.
     """
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
