@@ -187,8 +187,9 @@ class SurveySettings(Settings):
     exact_repetition_share: float = setting(1e-7, "of peak to peak")
     """Largest error of a repetition that proves an attractor: no run stays so close to an unstable cycle by chance."""
 
-    converged_swing_share: float = setting(1e-4, "of peak to peak")
-    """Largest error of a repetition that counts as converged where attraction need not be proved."""
+    converged_swing_share: float = setting(1e-5, "of peak to peak")
+    """Largest error of a repetition that counts as converged where attraction need not be proved. Runs come closer than
+    a larger one to unstable cycles by chance."""
 
     approach_share: float = setting(0.7, "")
     """Factor by which the error of a repetition must shrink over some swings for the run to approach an orbit."""

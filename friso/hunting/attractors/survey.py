@@ -23,7 +23,8 @@ class Swinging:
     - `distance` [m]: at which the stage sticks; `swings`: to either side in a period.
     - `cycles`, `number`: the closed orbit and its row; None if only a simulation or a return map shows the motion.
     - `seen`: final state (states,) of the run that showed the motion.
-    - `slope`: fraction of a deviation left after `time`, by the return map; NaN if unknown.
+    - `slope`: fraction of a deviation left after `time`, by the return map, or at most that by how soon a run came
+      close; NaN if unknown.
     """
 
     stage: int
@@ -460,7 +461,9 @@ class Survey:
                 self.unknown[owners[k]] = True
                 continue
             size, distance = float(repeats.size[k] / 2), float(ends.values[k, -1])
-            motion = Swinging(int(owners[k]), size, time, period, distance, swings, seen=ends.states[k])
+            # it has come as close as that within this round
+            slope = np.nan if self.prove else float(repeats.deviation[k] ** (time / ends.times[k, -1]))
+            motion = Swinging(int(owners[k]), size, time, period, distance, swings, seen=ends.states[k], slope=slope)
             self.add([motion])
 
 
