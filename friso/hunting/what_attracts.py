@@ -187,7 +187,7 @@ def surveyed_roughly(stages: Ensemble, rtol: float = RTOL, close: bool = True) -
         sure = np.flatnonzero(decided & mapped.attracts & ~doubtful)
         motions += [motion for number in sure.tolist() for motion in _seen_on_map(mapped, number)]
         if (numbers := np.flatnonzero(doubtful)).size:
-            for family in families(stages.take(numbers), rtol):
+            for family in families(stages.take(numbers), rtol, one_each=True):
                 motions += of_cycles(numbers, family, stages.sticking)
     if (left := np.flatnonzero(~decided)).size:
         survey = attractors(stages.take(left), cycles=False)
