@@ -173,10 +173,9 @@ class Bench:
         return states
 
     def released(self, displacements: np.ndarray) -> Trial:
-        """Return releases from displacements [m]."""
-        return Trial(
-            self._settled(np.zeros(len(displacements)), displacements), ("release",) * len(displacements), displacements
-        )
+        """Return releases from displacements [m]; the integrator balances the constant forces."""
+        count, balance = len(displacements), -sum(self.flat.get(f"bias.{mass}", 0.0) for mass in ("cart", "stage"))
+        return Trial(self._settled(np.zeros(count), displacements, balance), ("release",) * count, displacements)
 
     def follow(
         self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS, any_will_do: bool = True
