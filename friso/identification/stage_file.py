@@ -20,7 +20,7 @@ NOT_IDENTIFIED = "not identified: all that is possible"
 
 CHOSEN = "our choice, not identified"
 
-OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
+OUR_CHOICE = "what was identified says so beside its value; the rest is our choice"
 
 PLACEHOLDER = (
     "The [controller] of the stage file is our choice: put yours there, and delete this note, before you ask whether "

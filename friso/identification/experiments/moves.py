@@ -26,6 +26,11 @@ WITHOUT_CONTROLLER = (
     "intervals may be narrower, and more may be identified, as far as that loop explains the record"
 )
 
+WITHOUT_REFERENCE = (
+    "without the logged reference the controller of the stage file cannot be simulated: the simulated stage follows "
+    "the logged position"
+)
+
 OUT_OF_STEP = (
     "with the controller of the stage file the simulated machine gets out of step with the log, which was therefore "
     "fitted along its position; if the machine does not hunt, its controller may be another (check the gains and the "
@@ -102,7 +107,7 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     long = [result.log for result in results if result.log.is_excerpt]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
-        *([WITHOUT_CONTROLLER] if followed else []),
+        *([WITHOUT_CONTROLLER if stage is None else WITHOUT_REFERENCE] if followed else []),
         *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
         *(
             f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "

@@ -127,7 +127,7 @@ def _sentence(name: str, draws: Draws) -> str:
     keys = fates.separations(draws.sample.keys)
     lost = int(np.count_nonzero(fates.unstable))
     sentences = (
-        [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction."] if lost else []
+        [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction;"] if lost else []
     )
     hunting, attracted = (share_with_interval(fates.share(words)) for words in (("hunts",), ATTRACTED))
     none = "none hunts, and none has a cycle that attracts (fewer than {} % of all, with 95 % confidence)"

@@ -234,9 +234,9 @@ def checked_stage(
 ) -> CheckAnswer:
     """Check a stage, and draw machines if its keys are uncertain, with these correlations.
 
-    `draws` is the number of machines; by default, as many as a fixed work allows. With `laws`, the stage is checked
-    under other friction laws, too. `tolerance` is that of the solver. Raises InputError for a number of draws that is
-    not usable.
+    `draws` is the number of machines; by default, as many as a fixed work allows, and none if the loop is unstable.
+    With `laws`, the stage is checked under other friction laws, too. `tolerance` is that of the solver. Raises
+    InputError for a number of draws that is not usable.
     """
     settings = StudySettings.current()
     loose = max(tolerance, LONG_RUN_RTOL)
@@ -257,7 +257,7 @@ def checked_stage(
     cases = {name: _as_built(case) for name, case in cases.items()}
     drawn = across = None
     cut = False
-    if uncertain is not None:
+    if uncertain is not None and not cases["given"].unstable:
         from friso.studies.draws import affordable
 
         sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)

@@ -70,31 +70,35 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     `cases` holds all cases of the check, so that advice on one may use the others.
     """
     case = item.case
-    loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
     says |= {"none": _following}
     if case.runs_away:
-        return " ".join([*loop, "runs away from its reference for good."])
+        return _after_loop(case, "runs away from its reference for good.")
     if case.verdict not in says and case.solver.done:
-        return " ".join([*loop, _UNFINISHED])
+        return _after_loop(case, _UNFINISHED)
     if case.verdict not in says:
-        return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
+        return _after_loop(case, f"could not be simulated to the end of its motion ({case.solver.status}).")
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
     after += friction_sentences(case)
     stands = dwell_sentences(case.dwells) if case.verdict not in ATTRACTED else []
-    return " ".join([*loop, says[case.verdict](case), *stands, *feeds, *_doubts(case), *_running_away(case), *after])
+    sentences = [says[case.verdict](case), *stands, *feeds, *_doubts(case), *_running_away(case), *after]
+    return _after_loop(case, " ".join(sentences))
 
 
-def _loop(case: Case) -> list[str]:
-    """Say in which states the loop is unstable, whatever the friction; empty if in none.
+def _after_loop(case: Case, sentences: str) -> str:
+    """Say in which states the loop is unstable, whatever the friction, before what else is said of the stage.
 
-    A loop that only samples and delays of the drive make unstable is described as such.
+    A loop that only samples and delays of the drive make unstable is described as such. Returns `sentences` alone for a
+    stable loop.
     """
-    built = case.unstable_as_built
-    drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}. Without them, the stage"
-    return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else [drive] if built else []
+    if case.unstable:
+        return f"the loop is {unstable_where(case.unstable)}. {sentences[:1].upper()}{sentences[1:]}"
+    if built := case.unstable_as_built:
+        drive = f"with the samples and delays of its drive, the loop is {unstable_where(built)}"
+        return f"{drive}. Without them: {sentences}"
+    return sentences
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
@@ -209,8 +213,11 @@ def _transient(case: Case) -> str:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
         off = f"{length_at_rest(abs(case.offset))} off its reference"
         return f"does not hunt ({attracts}), but rests {off}: the leak of its integral holds it there{stays}."
+    chance = ""
     if judgement.cycle:
-        says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
+        grows = f"a factor of e in {with_unit(judgement.cycle.time_constant, 's')}"
+        says.append(f"Beside its unstable cycle, deviations grow by {grows}.")
+        chance = "; the least disturbance changes this time"
     if judgement.runs_away:
         says.append("Afterwards it runs away from its reference.")
     elif judgement.settled_after is None and judgement.followed is None:
@@ -220,7 +227,8 @@ def _transient(case: Case) -> str:
             f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
         )
     else:
-        says.append(f"It settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}.")
+        time = with_unit(judgement.settled_after, "s")
+        says.append(f"It settles to within {band_text(_TEN_MICRON)} in {time}{chance}.")
     return " ".join(says)
 
 

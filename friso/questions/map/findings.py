@@ -255,15 +255,15 @@ def own_place(runs: xr.Dataset, metric: str) -> list[str]:
     at = tuple(int(np.abs(np.log(axis.positions / value)).argmin()) for axis, value in zip(axes, own, strict=True))
     if words[at] not in (*ATTRACTED, *_QUIET):
         return []
-    ways = []
-    for k, axis in enumerate(axes):
-        ways += _changes(axis, words[(*at[:k], slice(None), *at[k + 1 :])], at[k])
+    lines = [words[(*at[:k], slice(None), *at[k + 1 :])] for k in range(len(axes))]
+    ways = [way for axis, line, own_cell in zip(axes, lines, at, strict=True) for way in _changes(axis, line, own_cell)]
     exact = all(np.isclose(axis.positions[k], value, rtol=1e-3) for axis, value, k in zip(axes, own, at, strict=True))
     subject = "Your stage" if exact else "The cell nearest to your stage"
     verb = words[at] if words[at] in ("hunts", "settles") else f"is {words[at]}"
     by = f" {basis}" if (basis := metrics()[metric].basis) else ""
     does = "begins" if words[at] in _QUIET else "ends"
-    where = f"; hunting {does} at {listed(ways, 'or')}" if ways else ""
+    nowhere = "; no cell in line with it hunts" if all(np.isin(line, _QUIET).all() for line in lines) else ""
+    where = f"; hunting {does} at {listed(ways, 'or')}" if ways else nowhere
     return [f"{subject} {verb}{by}{where}."]
 
 
