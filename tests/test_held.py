@@ -59,6 +59,6 @@ def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig:
     leaning = rig.replace({**joint, "friction.asymmetry": 0.1, "controller.crossover": "3.63 Hz"})
     flat = leaning.flat()
     stages = Ensemble.held(flat, 1)
-    (orbit,) = what_attracts(stages).motions
+    (orbit,) = of_cycles(np.arange(1), find_cycles(stages), stages.sticking)
     factor, _ = EdgeSearch(flat, 10.0).followed(1.0, orbit)
     assert 3.63 * factor == pytest.approx(3.6468, rel=0.01)

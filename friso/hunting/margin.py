@@ -134,7 +134,7 @@ class _Grid:
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
-        self.quiet: set[int] = set()
+        self.settled: float | None = None
         self._survey(np.arange(first, len(factors)))
 
     def search_below(self) -> None:
@@ -179,11 +179,8 @@ class _Grid:
         self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
         self.motions[index] = list(survey.motions)
         self.inspected.add(index)
-        self._note_quiet(np.array([index]))
-
-    def _note_quiet(self, numbers: np.ndarray) -> None:
-        """Store which of the inspected factors with these numbers surely have no attractor."""
-        self.quiet |= set(numbers[self.decided[numbers] & ~self.attracts[numbers]].tolist())
+        if self.decided[index] and not self.attracts[index]:
+            self.settled = float(self.factors[index])
 
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """Find the last factor at which the stage hunts while it does not at the next one.
@@ -241,9 +238,7 @@ class _Grid:
         """
         if not self.proved(at, ahead):
             return None
-        quiet = sorted((k for k in self.quiet if ahead * (k - at) > 0), key=lambda k: abs(k - at))
-        settled = float(self.factors[quiet[0]]) if quiet else None
-        outward = EdgeSearch(self.flat, HIGHEST if ahead > 0 else LOWEST, settled)
+        outward = EdgeSearch(self.flat, HIGHEST if ahead > 0 else LOWEST, self.settled)
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
         except Beyond:
@@ -270,7 +265,6 @@ class _Grid:
         """
         self.passed |= where
         self.attracts |= where
-        self.quiet -= set(np.flatnonzero(where).tolist())
         self.inspected -= set(np.flatnonzero(where & [not motions for motions in self.motions]).tolist())
 
     def proved(self, at: int, ahead: int) -> bool:
@@ -291,13 +285,12 @@ class _Grid:
 
     def _inspect(self, numbers: np.ndarray) -> None:
         """Close orbits at the factors with these numbers, and record what attracts the stage there."""
-        survey = what_attracts(self._stages(numbers), confirm=range(len(numbers)))
+        survey = what_attracts(self._stages(numbers))
         self.attracts[numbers] = survey.attracts | self.passed[numbers]
         self.decided[numbers] = survey.decided
         for k, number in enumerate(numbers.tolist()):
             self.motions[number] = list(survey.take(np.array([k])).motions)
         self.inspected |= set(numbers.tolist())
-        self._note_quiet(numbers)
 
     def lower_end(self, index: int) -> AttractionEnd | None:
         """Find the end of attraction below the bandwidth factor numbered `index`.

@@ -89,8 +89,8 @@ class Beyond(Exception):
 class EdgeSearch:
     """Search for an edge of hunting, towards the `farthest` factor of the bandwidth.
 
-    `flat` has the stage's keys in SI. At the factor `settled`, if given, it surely does not hunt: an attractor beyond
-    belongs to another window.
+    `flat` has the stage's keys in SI. At the factor `settled`, if given, it does not hunt: an attractor beyond belongs
+    to another window.
     """
 
     flat: Mapping[str, Any]
@@ -122,8 +122,6 @@ class EdgeSearch:
             end, distance = self.followed(place.at, orbit)
             place.at = end
             next_to, farther = self._just_beyond(end)
-            if next_to == self.settled:
-                return AttractionEnd(end, next_to, True)
             beyond, survey = self._proved(next_to, farther, ALONG * distance)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:

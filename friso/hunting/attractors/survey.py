@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friso.hunting.attractors.closing import close_orbits
+from friso.hunting.attractors.recurrence import Recurrence
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.find import Cycles
@@ -23,8 +24,7 @@ class Swinging:
     - `distance` [m]: at which the stage sticks; `swings`: to either side in a period.
     - `cycles`, `number`: the closed orbit and its row; None if only a simulation or a return map shows the motion.
     - `seen`: final state (states,) of the run that showed the motion.
-    - `slope`: fraction of a deviation left after `time`, by the return map, or at most that by how soon a run came
-      close; NaN if unknown.
+    - `slope`: fraction of a deviation left after `time`, by the return map or a run that came close; NaN if unknown.
     """
 
     stage: int
@@ -231,7 +231,8 @@ class Survey:
             runs, ends = one_round(runs.take(keep), most if self.prove else min(most, settings.unproved_round_steps))
             for farthest, which in ((self.rested, ends.rest), (self.away, ends.away)):
                 np.maximum.at(farthest, owners[which], begun[which])
-            swinging = self._still_swinging(runs, owners, ends, early=number < settings.close_from_round)
+            close_from = settings.close_from_round if self.prove else settings.regular_from_round
+            swinging = self._still_swinging(runs, owners, ends, early=number < close_from)
             swinging = self._within_budget(swinging, owners, ends)
             if not swinging.size:
                 return
@@ -267,10 +268,9 @@ class Survey:
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
-            settled = ends.repeats.deviation < SurveySettings.current().settled_swing_share
-            ready &= settled & ~leave & self.prove
+            ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
         if not self.prove:
-            ready &= ~self._exact(owners, ends)
+            ready &= ~self._exact(owners, ends) & (not early)
         self._close(runs, owners, ends, np.flatnonzero(ready))
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
@@ -461,10 +461,24 @@ class Survey:
                 self.unknown[owners[k]] = True
                 continue
             size, distance = float(repeats.size[k] / 2), float(ends.values[k, -1])
-            # it has come as close as that within this round
-            slope = np.nan if self.prove else float(repeats.deviation[k] ** (time / ends.times[k, -1]))
+            slope = np.nan if self.prove else _slope(repeats.take(np.array([k])), ends.times[k])
             motion = Swinging(int(owners[k]), size, time, period, distance, swings, seen=ends.states[k], slope=slope)
             self.add([motion])
+
+
+def _slope(repeats: Recurrence, times: np.ndarray) -> float:
+    """Estimate which fraction of a deviation a run leaves after each repetition; NaN if unknown.
+
+    `repeats` describes the end of the one run, and `times` [s] are its last turning points, shape (swings,). The error
+    of the repetition shrinks over the last swings. Where rounding hides that, the error has become so small within the
+    round.
+    """
+    settings = SurveySettings.current()
+    (time,), (error,), (earlier,) = repeats.time, repeats.deviation, repeats.earlier
+    shrinks = (error / earlier) ** (time / (times[-1] - times[-1 - settings.compared_swings]))
+    if shrinks < 1:
+        return float(shrinks)
+    return float(error ** (time / times[-1])) if error < settings.converged_swing_share else float("nan")
 
 
 def _kinds(

@@ -10,10 +10,11 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.guess import Guess, symmetric_guess, whole_guess
 from friso.hunting.cycle.multipliers import multipliers
-from friso.hunting.cycle.rest import stuck
+from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import OrbitSettings
 from friso.hunting.cycle.shooting import Orbits, close, swings_of_simplest
+from friso.hunting.cycle.swings import swings
 from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 
@@ -197,6 +198,8 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         subset, distances = stages.take(missing), guess.distances[missing] * distance
         trial = close(subset, stuck(subset, distances), guess.times[missing] * time, sign, rtol)
         _accept(stages, orbits, missing, trial, guess)
+    if stages.chatters:
+        _close_simulated(stages, guess, orbits, rtol)
     reasons = np.where(np.isfinite(guess.times), NOT_CLOSED, NO_RETURN)
     return described(stages, orbits, rtol, reasons)
 
@@ -211,6 +214,37 @@ def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, 
     good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
+
+
+def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
+    """Close orbits that are still open from the end of a long simulation that repeats itself.
+
+    The closed ones are copied into `orbits`.
+    """
+    settings = OrbitSettings.current()
+    missing = guess.numbers[~orbits.closed[guess.numbers]]
+    if not missing.size:
+        return
+    subset, sign = stages.take(missing), orbits.sign
+    starts = stuck(subset, guess.distances[missing])
+    extrema = swings(
+        subset, starts, settings.guess_returns * guess.times[missing], 4 * settings.guess_returns, COARSE_RTOL
+    )
+    rows, step = np.arange(subset.count), 1 if sign < 0 else 2
+    last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
+    last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side on which the orbit begins
+    heights = np.abs(np.stack([extrema.values[rows, last], extrema.values[rows, last - step]]))
+    times = extrema.times[rows, last] - extrema.times[rows, last - step]
+    fine = np.flatnonzero(
+        (last > settings.guess_returns // 2) & (np.abs(heights[0] / heights[1] - 1) < settings.steady_return_share)
+    )
+    if not fine.size:
+        return
+    ends_at = extrema.times[rows, last] + settings.unwinding_wait_share * wait(subset, heights[0])
+    ends = subset.take(fine).run(starts[fine], ends_at[fine], COARSE_RTOL).ends
+    if sign < 0:
+        ends *= np.sign(ends[:, stages.sticking])[:, None]
+    _accept(stages, orbits, missing[fine], close(subset.take(fine), ends, times[fine], sign, rtol), guess)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind

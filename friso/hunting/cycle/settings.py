@@ -28,6 +28,12 @@ class OrbitSettings(Settings):
     kept_distance_share: float = setting(0.5, "")
     """Largest distance of an orbit from its guess. Farther off it is another solution, such as rest."""
 
+    guess_returns: int = setting(40, "returns")
+    """Returns that are simulated to find an attractor where no orbit closes near a guess."""
+
+    steady_return_share: float = setting(0.02, "")
+    """Largest change of the last returns of a simulation that has reached a cycle."""
+
     refined_distances: int = setting(8, "")
     """Distances on which a fixed point of the map is narrowed down before Newton's method begins."""
 

@@ -257,7 +257,9 @@ def checked_stage(
     cases = {name: _as_built(case) for name, case in cases.items()}
     drawn = across = None
     cut = False
-    if uncertain is not None and not cases["given"].unstable:
+    if uncertain is not None and cases["given"].unstable:
+        LOGGER.warning("no machines were drawn from the uncertain keys: at their centres the loop is unstable")
+    elif uncertain is not None:
         from friso.studies.draws import affordable
 
         sample = draw(chosen, uncertain, affordable(chosen, uncertain, seed, loose), seed)

@@ -217,7 +217,7 @@ def _transient(case: Case) -> str:
     if judgement.cycle:
         grows = f"a factor of e in {with_unit(judgement.cycle.time_constant, 's')}"
         says.append(f"Beside its unstable cycle, deviations grow by {grows}.")
-        chance = "; the least disturbance changes this time"
+        chance = ", a time that the least disturbance changes if the motion comes near that cycle"
     if judgement.runs_away:
         says.append("Afterwards it runs away from its reference.")
     elif judgement.settled_after is None and judgement.followed is None:

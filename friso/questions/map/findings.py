@@ -67,7 +67,8 @@ def _answer(runs: xr.Dataset, name: str, finding: MapFinding) -> str:
     if not completed.any():
         return f"No cell of the map has a {'certain ' * bool(open_words)}result."
     if not holds.any() or np.array_equal(holds, completed):
-        cell = "cell with a certain result" if open_words else "cell of the map"
+        every = "cell of the map" if completed.all() else "cell with a result"
+        cell = "cell with a certain result" if open_words else every
         return f"{finding.clause} in {'every' if holds.any() else 'no'} {cell}."
     share = f"{finding.clause} in {_percent(holds.sum(), completed.sum())} of the map"
     axes, inside = axes_of(runs), completed.copy()
