@@ -196,7 +196,7 @@ def check(
     ----------
     draws : int, optional
         Draw so many stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt; default:
-        as many as a fixed work allows, some tens.
+        as many as a fixed work allows, some tens, and none if the loop is unstable.
     laws : bool
         Give also the verdict under every friction law that fits the same measurements.
 
