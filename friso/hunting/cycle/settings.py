@@ -137,6 +137,9 @@ class OrbitSettings(Settings):
     rough_gap: float = setting(1e-4, "of the states")
     """Gap down to which runs may be rough. With a smaller one Newton's method follows their errors."""
 
+    rough_stalled_gap: float = setting(1e-2, "of the states")
+    """Largest gap from which fine runs go on where rough ones stall. No orbit was ever closed from farther off."""
+
     fresh_jacobian_gap: float = setting(1e-5, "of the states")
     """Gap beyond which an old Jacobian misleads Newton's method."""
 

@@ -210,10 +210,14 @@ class _Shooting:
         return bool(self.active.any())
 
     def _refine(self) -> None:
-        """Let accurate runs replace rough ones that have nearly closed an orbit."""
-        near = self.rough & (self.gaps < OrbitSettings.current().rough_gap)
-        self.rough[near], self.active[near] = False, True
-        self.gaps[near], self.idle[near] = np.inf, 0
+        """Let accurate runs replace rough ones that have nearly closed an orbit, or stall near one."""
+        settings = OrbitSettings.current()
+        near = self.rough & (self.gaps < settings.rough_gap)
+        stalled = self.rough & ~near & ~self.active & (self.gaps < settings.rough_stalled_gap)
+        self.states[stalled], self.times[stalled] = self.best_states[stalled], self.best_times[stalled]
+        refined = near | stalled
+        self.rough[refined], self.active[refined] = False, True
+        self.gaps[refined], self.idle[refined] = np.inf, 0
 
     def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
         """Take one Newton step of the orbits numbered `which`, with runs to the tolerance `rtol`.
