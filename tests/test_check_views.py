@@ -10,7 +10,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from made_up import (
     NO_RETURN,
@@ -531,6 +531,7 @@ def test_windows_are_told_beside_the_edge() -> None:
 
 
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
+@example(1.00499 / 8, 5.085e-3)
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
     """The stated range contains the known range, including rounding."""
     case = replace(fake_case(), judgement=settles())

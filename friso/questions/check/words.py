@@ -366,7 +366,8 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
     if end.reserve < ROUGH:
         return _bandwidth(case, end.inside, up=None, digits=4)
     value, digits = end.inside * (_present_bandwidth(case) or 1.0), 4 if end.reserve < ROUGHER else 3
-    bound = end.reserve + abs(float(f"{value:.{digits}g}") / value - 1)
+    stated = float(f"{value:.{digits}g}")
+    bound = (end.reserve * value + abs(stated - value)) / stated
     return f"{_bandwidth(case, end.inside, up=None, digits=digits)} (± {percent(rounded_up(bound, 1), 1)})"
 
 
