@@ -366,7 +366,7 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("settles, coarsely", ["10 µm in 1.50 s"]),
         ("hunts, grows", ["was stopped", "may run away", "controller.anti_windup"]),
         ("settles, runs away", ["622 µm or more", "controller.anti_windup"]),
-        ("runs away", ["unstable while the stage slides", "uns away from its reference"]),
+        ("runs away", ["unstable while the stage slides", "away from its reference for good"]),
         ("transient, runs away", ["runs away from its reference", "622 µm or more"]),
         ("settles, not known whether it may", ["not known", 'controller.anti_windup, which is "none"']),
         ("bistable, may grow", ["may last", "not known", "11.8 Hz"]),

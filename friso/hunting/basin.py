@@ -100,10 +100,10 @@ def ends_in(
 def _ends_closed(
     flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Run stages whose attractors are closed orbits; find which runs end there.
+    """Find which runs end in attractors of which it is known how fast they attract.
 
     Runs begin in the states `starts` (None: those of the motion), and must swing as `target` says. They are judged
-    early; a run that has not reached an orbit by then is continued, twice as long each time. Returns which runs end
+    early; a run that has not reached an attractor by then is continued, twice as long each time. Returns which runs end
     there, which were completed, and the peak-to-peak swing [m], all of shape (count,).
     """
     settings = BasinSettings.current()

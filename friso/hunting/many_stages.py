@@ -105,9 +105,8 @@ def find_attractors(
     """Find one attractor of each stage, for stages of one structure, whatever their own motions.
 
     `flat` has the stages' keys in SI. Stages whose references never stand still cannot hunt. Orbits are closed to the
-    relative tolerance. Without `close_orbits`, only simulations are used, and motions that have converged count as
-    attracted. `threads` bounds the threads of runs, and setting `cancel` stops them. Raises Exhausted if an allowance
-    of work is used up.
+    relative tolerance. Without `close_orbits`, motions that have converged count as attracted. `threads` bounds the
+    threads of runs, and setting `cancel` stops them. Raises Exhausted if an allowance of work is used up.
     """
     stages = Ensemble.held(flat, count, form=shared_structure(flat), threads=threads, cancel=cancel)
     survey = attractors(stages, rtol=rtol, cycles=close_orbits) if can_hunt(flat) else None

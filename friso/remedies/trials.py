@@ -151,7 +151,8 @@ def attraction(
     machine hunts.
 
     An undecided bandwidth ends the survey of a machine. The survey of a point ends once fewer than the fraction
-    `enough` of its machines are still quiet. Simulations start from many states; no orbits are closed.
+    `enough` of its machines are still quiet. Simulations start from many states; motions that have converged count as
+    attracted.
     """
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count

@@ -31,8 +31,8 @@ class Target(ArrayRows):
 
     A run hunts if it still swings after the time `lasting` [s], by at least `amplitude` [m], half of peak to peak. Its
     period must be at most `period` [s]. A run that swings this far after the time `early` [s] will also do so later.
-    `observed` is true where attractors were only seen in simulations; motions nearby may then swing as far, but less
-    often.
+    `observed` is true where attractors were only seen in simulations that do not tell how fast they attract; motions
+    nearby may then swing as far, but less often.
     """
 
     amplitude: Any
@@ -117,7 +117,8 @@ def attractors(
     One attractor of each stage is enough, unless the survey is `thorough`, which looks for all of them. A thorough
     survey repeats simulations at a hundredth of the tolerance for stages of which no orbit was closed. Orbits are
     closed to the relative tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are
-    finite. Without `cycles`, only simulations are used, and a motion that has converged counts as attracted.
+    finite. Without `cycles`, a motion that has converged counts as attracted, and orbits are closed only from runs that
+    have not converged by the third round.
 
     A thorough survey runs all starts at once, as does one with `suggested` cycles: eight runs together take as long as
     one. Both also start runs beside unstable cycles. A stage for which no suggested cycle was closed gets as many

@@ -261,16 +261,18 @@ class Survey:
 
         The runs to follow swing, and have no attractor in the survey yet. `ends` is how the runs ended in the last
         round, and `owners`, shape (runs,), are the numbers of their stages. With `early`, orbits are closed only to
-        prove attraction (another round is cheaper), from runs that repeat well and resemble no unstable cycle.
+        prove attraction, from runs that repeat well and resemble no unstable cycle; else another round is cheaper.
         """
         self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
+        if early and not self.prove:
+            return np.flatnonzero(swinging)
         ready = swinging & (ends.repeats.swings > 0)
         if early:
             leave = self._repels(owners, ends) & ~self._stay(owners, ends)
             ready &= (ends.repeats.deviation < SurveySettings.current().settled_swing_share) & ~leave
         if not self.prove:
-            ready &= ~self._exact(owners, ends) & (not early)
+            ready &= ~self._exact(owners, ends)
         self._close(runs, owners, ends, np.flatnonzero(ready))
         return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
