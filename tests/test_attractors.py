@@ -40,7 +40,7 @@ from friso.hunting.attractors import Attractors, attractors, starts
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened
 from friso.hunting.attractors.settings import SurveySettings
-from friso.hunting.attractors.survey import Survey
+from friso.hunting.attractors.survey import Survey, _slope
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
 from friso.hunting.cycle.rest import bent
@@ -647,6 +647,15 @@ def test_swings_that_repeat_themselves() -> None:
     assert repeats.time.tolist() == [1.0, 2.0, 4.0]
     noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
     assert noisy.swings.tolist() == [0]
+
+
+@pytest.mark.parametrize("slope", [0.8, 0.95, 0.999])
+def test_a_run_tells_by_which_fraction_its_swings_approach_a_repetition(slope: float) -> None:
+    """A run that leaves a repetition, whose error is not small, tells nothing."""
+    swings = np.arange(32)
+    for share, expected in ((slope**swings, slope), (slope ** (31.0 - swings), np.nan)):
+        repeats = recurrence(((-1.0) ** swings * (1 + 0.03 * share))[None], 2.0 * swings[None], np.ones(1, bool))
+        assert _slope(repeats, 2.0 * swings) == pytest.approx(expected, rel=1e-6, nan_ok=True)
 
 
 def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_at_rest() -> None:
