@@ -22,6 +22,7 @@ from friso.hunting.boundary import (
     Space,
     Spot,
     diagram,
+    edge_curves,
     plane,
 )
 from friso.hunting.cases import LONG_RUN_RTOL, Case, Solver, check, check_given, needed_kernels
@@ -116,6 +117,7 @@ __all__ = [
     "displacements_that_hunt",
     "dwells",
     "dwells_of_trace",
+    "edge_curves",
     "edge_derivatives",
     "find_attractors",
     "find_cycles",

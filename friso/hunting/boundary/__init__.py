@@ -5,7 +5,7 @@ from friso.hunting.boundary.curve import CLOSED, Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
 from friso.hunting.boundary.locate import Bifurcation, LocatedPoint
 from friso.hunting.boundary.meetings import Meeting
-from friso.hunting.boundary.plane import Plane, plane
+from friso.hunting.boundary.plane import Plane, edge_curves, plane
 from friso.hunting.boundary.space import KeyRange, Space
 
 __all__ = [
@@ -23,5 +23,6 @@ __all__ = [
     "Space",
     "Spot",
     "diagram",
+    "edge_curves",
     "plane",
 ]

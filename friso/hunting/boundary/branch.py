@@ -133,21 +133,57 @@ class Tracer:
         The plane passes through `target` with the normal `normal`. The Jacobian of the cycle `near` is used, if it has
         one. Returns None if no cycle is found.
         """
-        border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
             begin = begin * np.exp(target[1] - near.distance) if states is None else states
             times, place = times * np.exp(target[2] - near.time), target[:1]
+        return self._closed(begin, times, place, target[None], normal, near.jacobians)[0]
+
+    def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
+        """Find the cycles on parallel planes through `targets`, (planes, 3), all at once from a cycle `near` them.
+
+        Targets and the `normal`, (3,), are in the space of place, log distance and log time. Cycles that are not found
+        are left out.
+        """
+        begin = near.cycle.states * np.exp(targets[:, 1:2] - near.distance)
+        times = near.cycle.orbits.times * np.exp(targets[:, 2] - near.time)
+        points = self._closed(begin, times, targets[:, 0], targets, normal)
+        return [point for point in points if point]
+
+    def _closed(
+        self,
+        states: np.ndarray,
+        times: np.ndarray,
+        places: np.ndarray,
+        targets: np.ndarray,
+        normal: np.ndarray,
+        jacobians: np.ndarray | None = None,
+    ) -> list[Point | None]:
+        """Close one cycle on each of several parallel planes; None for a plane on which none is found.
+
+        The planes pass through `targets`, (planes, 3), with the `normal`, (3,). The search starts from `states`
+        (planes, states), `times` [s] and `places`, (planes,), with `jacobians` of cycles near them if known.
+        """
+
+        def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
+            """Return the stages at `places` along the one line that is followed."""
+            return self.family(np.zeros(len(places), np.int64), places)
+
+        border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
         orbits, places, jacobians = close_along(
-            self.family, begin, times, place, border, self.sign, self.rtol, self.swings, near.jacobians
+            family, states, times, places, border, self.sign, self.rtol, self.swings, jacobians
         )
-        if not orbits.closed[0]:
-            return None
-        stages = self.family(np.zeros(1, np.int64), places)
-        cycle = described(stages, orbits, self.rtol)
-        if not np.isfinite(cycle.multiplier[0]) or not np.isfinite(cycle.amplitude[0]):
-            return None
-        return Point.of(stages, float(places[0]), cycle, jacobians if np.isfinite(jacobians).all() else None)
+        stages = family(np.zeros(0), places)
+        cycles = described(stages, orbits, self.rtol)
+        usable = cycles.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
+        certain = np.isfinite(jacobians).all(axis=(1, 2))
+        ones = [np.array([k]) for k in range(len(places))]
+        return [
+            Point.of(stages.take(k), float(places[k[0]]), cycles.take(k), jacobians[k] if certain[k[0]] else None)
+            if usable[k[0]]
+            else None
+            for k in ones
+        ]
 
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.crossing import Crossing, FoldBack, crossing, turn
+from friso.hunting.boundary.crossing import crossing, turn
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.settings import ToleranceSettings
 
@@ -29,8 +29,8 @@ class LocatedPoint:
 
     `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
     key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter
-    that chatters it is the error bound of `smoothed` or `turned`. `slope` is the change of the multiplier along the
-    direction.
+    that chatters it is the error bound of a curve through orbits beside the point. `slope` is the change of the
+    multiplier along the direction.
     """
 
     kind: Bifurcation
@@ -77,7 +77,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> L
     Returns None if a cycle on the way cannot be closed.
     """
     direction = towards(first, second)
-    points = _enclosed(tracer, first, second, kind, ContinuationSettings.current().special_point_step)
+    points = _enclosed(tracer, first, second, kind, _last_step(tracer, kind, first.place))
     if points is None:
         return None
     nearest = min(points, key=lambda place: abs(distance_to(kind, points[place])))
@@ -150,6 +150,27 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
+def _last_step(tracer: Tracer, kind: Bifurcation, place: float) -> float:
+    """Return the step with which the search for a special point ends, in the space of place, log distance and log time.
+
+    Where a limiter chatters, multipliers scatter, and those of several orbits decide in the end: the search need not
+    come nearer than a fraction of the distances of these orbits.
+    """
+    settings = ContinuationSettings.current()
+    if not _chatters(tracer, place):
+        return settings.special_point_step
+    return settings.chattering_step_share * _cubic_reach(tracer, kind, place)
+
+
+def _chatters(tracer: Tracer, place: float) -> bool:
+    return tracer.family(np.zeros(1, np.int64), np.array([place])).chatters
+
+
+def _cubic_reach(tracer: Tracer, kind: Bifurcation, place: float) -> float:
+    """Return how far from a special point the orbits lie through which a cubic is fitted, to either side."""
+    return ContinuationSettings.current().chattering_fold_reach if kind == "fold" else tracer.hundredth(place)
+
+
 def _special_point(
     tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
 ) -> LocatedPoint:
@@ -158,14 +179,9 @@ def _special_point(
     `direction`, shape (3,), is that of the branch, and `slope` the change of the multiplier along it. The error is
     infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
     """
-    if tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
-        if kind == "fold":
-            return _turning_point(tracer, point, direction, slope)
-        passed = smoothed(tracer, point, kind)
-        if passed is None:
-            return LocatedPoint(kind, point, direction, np.inf, slope)
-        there = tracer.solve(point, point.vector + (passed.place - point.place) * ALONG, ALONG) or point
-        return LocatedPoint(kind, there, direction, passed.reserve, passed.slope * float(direction[0]))
+    if _chatters(tracer, point.place):
+        guess = point.vector - distance_to(kind, point) / slope * direction
+        return (_turning_point if kind == "fold" else _passed)(tracer, kind, point, guess, direction, slope)
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * ToleranceSettings.current().check_rtol_factor).solve(
         point, point.vector, direction
     )
@@ -177,57 +193,54 @@ def _special_point(
     )
 
 
-def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
-    """Locate a fold with a limiter that chatters, from a cycle `point` with a multiplier of 1.
+def _passed(
+    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray, slope: float
+) -> LocatedPoint:
+    """Locate a flip or torus where a limiter chatters, by a curve through the multipliers of orbits about a guess.
 
-    `direction` is that of the branch. The error is infinite if the fold cannot be located.
+    There multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key are used. They are
+    closed from the cycle `near` the `guess`, a point in the space of place, log distance and log time. `direction` is
+    that of the branch, and `slope` the change of the multiplier along it. The error is that of the curve, or what the
+    multiplier at the located point is off if larger; infinite if the point cannot be located.
     """
-    at = turned(tracer, point, direction)
-    there = at and tracer.solve(point, point.vector + at.length * direction, direction)
-    if not at or not there:
-        return LocatedPoint("fold", point, direction, np.inf, slope)
-    return LocatedPoint("fold", there, direction, max(at.reserve, 2 * abs(there.place - at.place)), slope)
+    orbits = _about(tracer, kind, near, guess, ALONG)
+    values = np.array([distance_to(kind, point) for point in orbits])
+    passed = crossing(np.array([point.place for point in orbits]), values)
+    there = passed and tracer.solve(near, guess + (passed.place - guess[0]) * ALONG, ALONG)
+    if not passed or not there:
+        return LocatedPoint(kind, near, direction, np.inf, slope)
+    error = max(passed.reserve, abs(distance_to(kind, there) / passed.slope))
+    return LocatedPoint(kind, there, direction, error, passed.slope * float(direction[0]))
 
 
-def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None:
-    """Locate a flip or torus by a curve through the multipliers of orbits near a first guess.
+def _turning_point(
+    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray, slope: float
+) -> LocatedPoint:
+    """Locate a fold where a limiter chatters, by a curve through orbits about a guess, along the branch.
 
-    Where a limiter chatters, multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key
-    are used. The error bound is that of the curve, or the distance to the first guess if larger. Returns None if the
-    point cannot be located.
+    There each multiplier is an average over a range of distances, and passes 1 beside the fold. The orbits are closed
+    from the cycle `near` the `guess`, a point in the space of place, log distance and log time. `direction` is that of
+    the branch, and `slope` the change of the multiplier along it. The error is infinite if the fold cannot be located.
     """
-    orbits = _beside(tracer, guess, ALONG, tracer.hundredth(guess.place))
-    places = np.array([point.place for point in orbits])
-    passed = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
-    return passed and passed._replace(reserve=max(passed.reserve, abs(passed.place - guess.place)))
-
-
-def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
-    """Locate a fold by a curve through orbits near a first guess, along a direction.
-
-    Where a limiter chatters, each multiplier is an average over a range of distances, and passes 1 beside the fold. The
-    error bound is that of the curve, or the distance to the first guess if larger. Returns None if the fold cannot be
-    located.
-    """
-    orbits = _beside(tracer, guess, direction, ContinuationSettings.current().chattering_fold_reach)
-    lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
+    orbits = _about(tracer, kind, near, guess, direction)
+    lengths = np.array([(point.vector - guess) @ direction for point in orbits])
     at = turn(lengths, np.array([point.place for point in orbits]))
-    return at and at._replace(reserve=max(at.reserve, abs(at.place - guess.place)))
+    there = at and tracer.solve(near, guess + at.length * direction, direction)
+    if not at or not there:
+        return LocatedPoint(kind, near, direction, np.inf, slope)
+    return LocatedPoint(kind, there, direction, max(at.reserve, 2 * abs(there.place - at.place)), slope)
 
 
-def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
-    """Return orbits on both sides of the orbit `guess`, in steps along a branch, up to `reach`.
+def _about(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray) -> list[Point]:
+    """Return orbits on both sides of a guessed special point, in steps along a direction, closed at once.
 
-    `direction` (3,) is that of the branch, in the space of place, log distance and log time.
+    The `guess` and the `direction` (3,) are in the space of place, log distance and log time; the search starts from
+    the cycle `near` them.
     """
-    settings = ContinuationSettings.current()
-    orbits: list[Point] = []
-    for way in (-1.0, 1.0):
-        near: Point | None = guess
-        for away in way * np.linspace(0, reach, settings.cubic_values // 2 + 1)[1:]:
-            near = near and tracer.solve(near, guess.vector + away * direction, direction)
-            orbits += [near] if near else []
-    return orbits
+    reach, settings = _cubic_reach(tracer, kind, float(guess[0])), ContinuationSettings.current()
+    return tracer.solve_all(
+        near, guess + np.linspace(-reach, reach, settings.cubic_values)[:, None] * direction, direction
+    )
 
 
 def corrected(
@@ -247,6 +260,7 @@ def corrected(
     the multiplier if known. Returns None if there is no such point.
     """
     settings = ContinuationSettings.current()
+    chatters, last_step = _chatters(tracer, float(origin[0])), _last_step(tracer, kind, float(origin[0]))
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
     for _ in range(settings.special_point_tries):
         if (latest := points[-1]) is None:
@@ -255,9 +269,10 @@ def corrected(
             slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
         off, first = distance_to(kind, latest), len(points) == 1
         step = -off / slope if slope else np.inf
-        if abs(step) < settings.special_point_step and (not first or abs(off) < settings.met_multiplier_error):
-            return _special_point(tracer, kind, latest, direction, slope)
-        if first and not settings.special_point_step <= abs(step) <= reach:
+        if abs(step) < last_step and (chatters or not first or abs(off) < settings.met_multiplier_error):
+            special = _special_point(tracer, kind, latest, direction, slope)
+            return special if np.isfinite(special.error) or not chatters else None
+        if first and not last_step <= abs(step) <= reach:
             step = settings.slope_step
         elif not abs(places[-1] + step) <= reach:
             return None

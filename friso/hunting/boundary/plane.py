@@ -52,6 +52,31 @@ class Plane:
     meetings: tuple[Meeting, ...] = ()
 
 
+@dataclass(frozen=True)
+class _Followed:
+    """Curves followed from a grid of stages, and what was computed on the way.
+
+    `points` are the coordinates of all stages of the grid, shape (points, 2), and `allowed` the numbers of the valid
+    ones. `stages` are the valid ones, and `cycles` their hunting cycles. `curves` and `gaps` are those of a `Plane`.
+    """
+
+    points: np.ndarray
+    allowed: np.ndarray
+    stages: Ensemble
+    cycles: Cycles
+    curves: tuple[Curve, ...]
+    gaps: list[np.ndarray]
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def edge_curves(space: Space, rtol: float = RTOL, nodes: int | None = None) -> tuple[Curve, ...]:
+    """Find the curves in the plane of two keys on which the hunting cycle stops attracting, and nothing else.
+
+    The arguments and curves are those of `plane`.
+    """
+    return _followed(space, rtol, _nodes(nodes), silent).curves
+
+
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: Progress = silent) -> Plane:
     """Find all curves in the plane of two keys on which the hunting cycle stops attracting.
@@ -59,19 +84,10 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
     Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between
     `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
     """
-    nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
-    points = space.grid(nodes)
-    allowed = np.flatnonzero(space.allowed(points))
-    stages = space.stages(points[allowed])
-    hunting, searches = _searches(stages, rtol)
-    changing = [
-        (cycles, [*_changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes))])
-        for cycles, inside, outside in searches
-    ]
-    tally = Tally(progress, sum(len(pairs) for _, pairs in changing))
-    parts = side_by_side([partial(_sought, space, points, allowed, *search, rtol, tally) for search in changing])
-    curves = [curve for of_one, _ in parts for curve in of_one]
-    gaps = [gap for _, of_one in parts for gap in of_one]
+    nodes = _nodes(nodes)
+    followed = _followed(space, rtol, nodes, progress)
+    points, allowed, stages, hunting = followed.points, followed.allowed, followed.stages, followed.cycles
+    curves, gaps = followed.curves, followed.gaps
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
     if undecided.size:
@@ -87,7 +103,27 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
             gaps.append(middle)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
     meetings = find_meetings(space, curves, rtol)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
+    return Plane(space, curves, nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
+
+
+def _nodes(asked: int | None) -> int:
+    return ContinuationSettings.current().grid_stages if asked is None else asked
+
+
+def _followed(space: Space, rtol: float, nodes: int, progress: Progress) -> _Followed:
+    """Follow every curve that passes between neighbouring stages of a grid."""
+    points = space.grid(nodes)
+    allowed = np.flatnonzero(space.allowed(points))
+    stages = space.stages(points[allowed])
+    hunting, searches = _searches(stages, rtol)
+    changing = [
+        (cycles, [*_changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes))])
+        for cycles, inside, outside in searches
+    ]
+    tally = Tally(progress, sum(len(pairs) for _, pairs in changing))
+    parts = side_by_side([partial(_sought, space, points, allowed, *search, rtol, tally) for search in changing])
+    curves = tuple(curve for of_one, _ in parts for curve in of_one)
+    return _Followed(points, allowed, stages, hunting, curves, [gap for _, of_one in parts for gap in of_one])
 
 
 def _sought(

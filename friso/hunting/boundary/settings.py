@@ -98,6 +98,10 @@ class ContinuationSettings(Settings):
     chattering_fold_reach: float = setting(0.03, "")
     """Largest distance from a fold at which the multiplier may be 1, where a limiter chatters."""
 
+    chattering_step_share: float = setting(0.25, "distances of the orbits of a cubic")
+    """Last step of the search for a special point where a limiter chatters. Nearer, the scatter of multipliers leads
+    nowhere; farther off, the cubic's orbits may lie on one side."""
+
     same_cycle_log: float = setting(0.02, "")
     """Largest difference in log distance and log time between two computations of one cycle."""
 
