@@ -244,11 +244,8 @@ def _signals(
         "position": reading,
         "force": commanded,
     }
-    if len(task.injected) and not task.unknown:
-        places = np.arange(len(task.injected)) * task.injected_each
-        logged["disturbance"] = np.broadcast_to(
-            np.interp(time, places, task.injected, right=0.0), logged["force"].shape
-        )
+    if task.injected.size and not task.unknown:
+        logged["disturbance"] = np.broadcast_to(task.injected_at(time), logged["force"].shape)
     true = {"position": position, "velocity": samples[:, :, shape.velocity]}
     if shape.cart_position != shape.position:
         cart = true["cart_position"] = samples[:, :, shape.cart_position]

@@ -70,19 +70,17 @@ def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tup
     The second result is the number of points per second.
     """
     settings = RigSettings.current()
-    injected = len(task.injected) > 0
+    injected = task.injected.size > 0
     if floor is None and not injected:
         return np.zeros((1, 2, 2)), 0.0
     fine = [task.injected_each] if injected else []
     fine += [1 / (settings.points_per_period * floor.frequency[-1])] if floor else []
     interval = min(fine)
     count = int(np.ceil(task.duration / interval)) + 2
-    inputs = np.zeros((len(seeds) if floor else 1, 2, count))
+    inputs = np.zeros((len(seeds) if floor or task.injected.ndim > 1 else 1, 2, count))
     if injected:
-        times = np.arange(len(task.injected)) * task.injected_each
-        inputs[:, 0] = np.interp(np.arange(count) * interval, times, task.injected, right=0.0)
+        inputs[:, 0] = task.injected_at(np.arange(count) * interval)
     if floor:
-        for run, seed in enumerate(seeds):
-            shaken = floor_acceleration(floor, count * interval, interval, seed)
-            inputs[run, 1] = shaken[:count]
+        shaken = {seed: floor_acceleration(floor, count * interval, interval, seed)[:count] for seed in set(seeds)}
+        inputs[:, 1] = [shaken[seed] for seed in seeds]
     return inputs, 1 / interval

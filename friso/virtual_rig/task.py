@@ -25,8 +25,8 @@ class MoveTask:
     The reference consists of `pieces`, shape (pieces, 1 + inputs): the start of each, then the numbers of its
     polynomial or other `form` (`friso.equations.reference`). For runs with different moves the shape is (runs, pieces,
     1 + inputs). `duration` is in seconds. `injected` has the injected force [N] every `injected_each` [s], shape (n,),
-    empty for none; the drive logs it unless it is `unknown` to it. The stage starts at rest where the reference does,
-    or displaced from it by `displacement` [m].
+    empty for none, or (runs, n) for runs with different forces; the drive logs it unless it is `unknown` to it. The
+    stage starts at rest where the reference does, or displaced from it by `displacement` [m].
     """
 
     pieces: np.ndarray
@@ -52,7 +52,13 @@ class MoveTask:
         """Return the task restricted to some of the runs, by number."""
         own = self.pieces[numbers] if self.pieces.ndim > 2 else self.pieces
         displacement = self.displacement[numbers] if np.ndim(self.displacement) else self.displacement
-        return replace(self, pieces=own, displacement=displacement)
+        injected = self.injected[numbers] if self.injected.ndim > 1 else self.injected
+        return replace(self, pieces=own, displacement=displacement, injected=injected)
+
+    def injected_at(self, times: np.ndarray) -> np.ndarray:
+        """Return the injected force [N] at times [s], shape (1 or runs, times): 0 after its end."""
+        places = np.arange(self.injected.shape[-1]) * self.injected_each
+        return np.array([np.interp(times, places, force, right=0.0) for force in np.atleast_2d(self.injected)])
 
 
 def own_motion(stage: Stage) -> MoveTask:

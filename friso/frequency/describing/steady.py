@@ -48,7 +48,7 @@ class Imposition:
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
 
-    @property
+    @cached_property
     def kernel(self) -> Kernel:
         """Return the compiled friction law under an imposed motion."""
         first = {key: value[0] if np.ndim(value) else value for key, value in self.flat.items()}
@@ -72,18 +72,18 @@ class Imposition:
     def symmetric(self) -> bool:
         """Tell whether mirrored motions have mirrored friction forces, tested at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
-        pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
-        return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
+        one, mirrored = (self._reaction(way * states.transpose(2, 0, 1)) for way in (1, -1))
+        return bool(np.all(np.abs(one + mirrored) <= 1e-9 * np.abs(one)))
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
-        """Return friction force and rates of change of the law's own states, (1 + inner, count).
+        """Return friction force and rates of change of the law's own states, (1 + inner, ..., count).
 
-        They follow from states (states, count).
+        They follow from states of shape (states, ..., count).
         """
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         rates = module.right_hand_side(states, modes, 0.0, at_rest, self.values)
-        return np.vstack([self.force(states), _rows([rates[i] for i in self.inner], self.count)])
+        return np.array([self.force(states), *(np.broadcast_to(rates[i], states.shape[1:]) for i in self.inner)])
 
     def force(self, states: np.ndarray) -> np.ndarray:
         """Return the friction force [N] in states of shape (states, ..., count)."""
@@ -112,10 +112,6 @@ class Imposition:
         options = RunOptions(rtol=self.rtol, interval=interval, chunk=chunk)
         for part in run_chunks(self.kernel, {**self.flat, "motion.duration": share}, self.count, options, starts):
             yield part.numbers, part.results
-
-
-def _rows(rows: list[Any], count: int) -> np.ndarray:
-    return np.array([np.broadcast_to(row, (count,)) for row in rows], dtype=float).reshape(len(rows), count)
 
 
 def periodic_gap(rtol: float) -> float:

@@ -5,8 +5,8 @@ The experiment shows which disturbance moves the stage, and what damping recover
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import astuple, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,10 @@ class Standstill:
     read: np.ndarray
     mean: np.ndarray
     spectrum: np.ndarray
+
+    def of_run(self, run: int) -> Standstill:
+        """Return the standstill of one run, by its number."""
+        return Standstill(*(values[[run]] for values in astuple(self)))
 
 
 @dataclass(frozen=True)
@@ -121,42 +125,33 @@ def in_position(
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
-    standstill = standing(0.0, SETTLING + WATCHED)
     step = as_built_keys(stage)["drive.sample_time"]
-    noisy = with_noise(standstill, force, seed, step)
-    plans = {
-        "encoder": (quiet, standstill),
-        "amplifier": (quiet, noisy),
-        "floor": (shaken, standstill),
-        "all": (shaken, noisy),
-    }
-    runs, recordings, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
-    for case, locked in CASES.items():
-        for source, (machine, task) in plans.items():
-            progress(done, total, f"joint {case}, {source}")
-            done += 1
+    noisy = with_noise(standing(0.0, SETTLING + WATCHED), force, seed, step)
+    after_move = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
+    louder_names = [f"{factor:g} times the noise" for factor in noises]
+    plans = (
+        (quiet, {"encoder": 0.0, "amplifier": 1.0}),
+        (shaken, {"all": 1.0, "floor": 0.0} | dict(zip(louder_names, noises, strict=True))),
+    )
+    runs, recordings, after = {}, {}, {}
+    for done, (case, locked) in enumerate(CASES.items()):
+        progress(done, len(CASES) + 1, f"joint {case}")
+        for machine, factors in plans:
             fixed = machine.replace({"joint.locked": locked})
-            recorded = _recorded(fixed, task, seed, _silenced(fixed, source))
-            runs[case, source] = _standstill(recorded, SETTLING)
-            if source == "all":
+            task = replace(noisy, injected=np.outer([*factors.values()], noisy.injected))
+            recorded = _recorded(fixed, task, seed, _silenced(fixed, factors), len(factors))
+            stands = _standstill(recorded, SETTLING)
+            runs |= {(case, source): stands.of_run(row) for row, source in enumerate(factors)}
+            if "all" in factors:
                 recordings[case] = (recorded, fixed)
-        progress(done, total, f"joint {case}, after a move")
-        done += 1
-        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
-        after[case] = _standstill(_recorded(shaken.replace({"joint.locked": locked}), task, seed), SETTLING)
-    progress(done, total, "joint free, more and less damping")
-
-    def peaks(factor: float) -> tuple[float, float]:
-        task = with_noise(standstill, factor * force, seed, step)
-        locked, free = (_recorded(shaken.replace({"joint.locked": held}), task, seed) for held in CASES.values())
-        first, second = (float(_standstill(recorded, SETTLING).true[0, 1]) for recorded in (locked, free))
-        return first, second
-
-    louder = {factor: peaks(factor) for factor in noises}
+                after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING)
+    progress(len(CASES), len(CASES) + 1, "joint free, more and less damping")
+    peaks = {name: tuple(float(runs[case, name].true[0, 1]) for case in CASES) for name in louder_names}
+    louder = dict(zip(noises, peaks.values(), strict=True))
     flat = stage.flat()
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
-    progress(total, total, "done")
+    progress(len(CASES) + 1, len(CASES) + 1, "done")
     traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in recordings.items()}
     logged_each = interval(stage, INTERVAL)
     frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
@@ -185,14 +180,14 @@ def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask
     return replace(task, injected=force * noise, injected_each=step, unknown=True)
 
 
-def _silenced(stage: Stage, source: str) -> dict[str, Any]:
-    """Return the keys that switch off the encoder's noise and resolution, with value 0.
+def _silenced(stage: Stage, sources: Iterable[str]) -> dict[str, Any]:
+    """Return noise and resolution of the encoder for a run with each source of the disturbance.
 
-    The result is empty if the `source` of the disturbance is "encoder" or "all", or if the stage has no drive.
+    They are 0 in runs with the amplifier or the floor alone. The result is empty if the stage has no drive.
     """
-    if source in ("encoder", "all") or stage.drive is None:
-        return {}
-    return {key: 0.0 for key in ("drive.encoder_noise", "drive.encoder_resolution") if key in stage.flat()}
+    flat, silent = stage.flat(), np.isin([*sources], ("amplifier", "floor"))
+    keys = ("drive.encoder_noise", "drive.encoder_resolution") if stage.drive is not None else ()
+    return {key: np.where(silent, 0.0, flat[key]) for key in keys if key in flat}
 
 
 def _recorded(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from friso.hunting.criteria import FAILED
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
@@ -25,6 +26,9 @@ from friso.studies.rig.outcome import Outcome, rig_log
 CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
 """Crossovers relative to the stage's. The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our
 choice."""
+
+AT_ONCE = 5
+"""Rails tried at once on a cell of the grid, before more are needed to find any with peaks."""
 
 STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 """Strokes relative to the stage's: up to 1 mm in Table 3. The steps are our choice."""
@@ -108,3 +112,41 @@ def stroke_crossover(
     return StrokeCrossover(
         sizes, frequencies, seeds, crossover(stage), runs.shaped(len(sizes), len(frequencies), len(seeds))
     )
+
+
+def limits_of_crossover(
+    stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray
+) -> StrokeCrossover:
+    """Run the move on a grid of strokes and crossovers, but no more runs than its limits need.
+
+    For each stroke, crossovers are tried from the highest down, to the first at which some rail has counted peaks; the
+    lowest is always tried. No more rails are run on a cell once one has peaks. Runs left out have the outcome "failed".
+    The arguments are those of `stroke_crossover`.
+    """
+    sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
+    shape = len(sizes), len(frequencies), len(seeds)
+    tried, runs = np.zeros(shape, bool), _left_out(int(np.prod(shape)))
+    cells = {(row, column) for row in range(len(sizes)) for column in (0, len(frequencies) - 1)}
+    while cells:
+        chosen = [
+            np.ravel_multi_index((*cell, rail), shape)
+            for cell in sorted(cells)
+            for rail in np.flatnonzero(~tried[cell])[:AT_ONCE]
+        ]
+        row, column, rail = np.unravel_index(chosen, shape)
+        changes = {"joint.stroke": sizes[row], crossover_key(stage): frequencies[column], "rail.seed": seeds[rail]}
+        several = run_moves(stage, move(stage), [seed + int(number) for number in rail], changes)
+        for entry in fields(runs):
+            getattr(runs, entry.name)[chosen] = getattr(several, entry.name)
+        tried.flat[chosen] = True
+        counted = runs.counted.reshape(shape).any(axis=2)
+        free = {cell for cell in cells if tried[cell].all() and not counted[cell]}
+        below = {(row, column - 1) for row, column in free if column}
+        cells = {cell for cell in cells - free | below if not counted[cell] and not tried[cell].all()}
+    return StrokeCrossover(sizes, frequencies, seeds, crossover(stage), runs.shaped(*shape))
+
+
+def _left_out(count: int) -> RailRuns:
+    """Return the results of `count` runs of which none was run."""
+    numbers = {entry.name: np.full(count, np.nan) for entry in fields(RailRuns)}
+    return RailRuns(**numbers | {"peaks": np.zeros(count, np.int64), "outcome": np.full(count, FAILED, object)})

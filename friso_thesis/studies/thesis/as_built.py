@@ -45,7 +45,7 @@ from friso.studies.rig.outcome import rig_log
 from friso.studies.rig.sizes import freed, locked_stage, pace, travel
 from friso_thesis.studies.rig.in_position import InPosition, in_position
 from friso_thesis.studies.rig.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
-from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, stroke_crossover
+from friso_thesis.studies.rig.stroke_crossover import StrokeCrossover, limits_of_crossover
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
     {
@@ -153,9 +153,9 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Run moves with the rig's real drive over strokes and crossovers on all rails (Fig. 26)."""
+    """Run moves with the rig's real drive over strokes and crossovers, as the limits of hunting need (Fig. 26)."""
     seeds = 1.0 + np.arange(float(RAILS))
-    return stroke_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
+    return limits_of_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds)
 
 
 def cycles(stage: Stage) -> CyclesOnRails:
