@@ -93,6 +93,27 @@ def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, valu
 
 
 @pytest.mark.inner
+def test_orbits_closed_at_once_are_those_closed_one_by_one() -> None:
+    """The limiter of the thesis's rig chatters, so that multipliers scatter; places and periods do not."""
+    free = VARIANTS["free"].replace({"joint.stroke": "0.2 mm"})
+    space = Space.of(free, [KeyRange("controller.crossover", 5.0, 7.0, unit="Hz")])
+    tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), -1.0)
+    stages = space.stages(np.zeros((1, 1)))
+    assert stages.chatters
+    start = Point.of(stages, 0.0, symmetric_cycles(stages))
+    along = np.array([1.0, 0.0, 0.0])
+    targets = start.vector + np.linspace(0.0, 0.01, 4)[:, None] * along
+    several = tracer.solve_all(start, targets, along)
+    singly = [tracer.solve(start, target, along) for target in targets]
+    assert len(several) == 4
+    for one, other, target in zip(several, singly, targets, strict=True):
+        assert other is not None
+        assert one.place == other.place == pytest.approx(target[0])
+        assert one.vector == pytest.approx(other.vector, abs=1e-4)
+        assert one.multiplier == pytest.approx(other.multiplier, abs=0.02)
+
+
+@pytest.mark.inner
 def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> None:
     """Straight lines through scattered values: the reserve usually holds the true place.
 

@@ -37,6 +37,20 @@ def test_the_stroke_of_a_free_joint_matters() -> None:
     assert rig_document(outcome)["results"]
 
 
+def test_limits_take_fewer_runs_than_the_grid_that_shows_them() -> None:
+    """What is left out cannot move a limit: the lowest crossover is tried on some rails, one above the limit on all."""
+    free, seeds = with_joint(RIG, locked=False), np.arange(1.0, 4.0)
+    grid = free, 1, np.array([0.02, 1.0]), np.array([0.5, 0.75, 1.5]), seeds
+    with patched({stroke_crossover: {"AT_ONCE": 1}}):
+        brief = stroke_crossover.limits_of_crossover(*grid)
+    whole = stroke_crossover.stroke_crossover(*grid, silent)
+    assert brief.limits == pytest.approx(whole.limits)
+    tried = ~brief.runs.failed
+    assert brief.runs.swing[tried] == pytest.approx(whole.runs.swing[tried])
+    assert not tried.all()
+    assert tried[:, 0].any(axis=1).all()
+
+
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
     """Fig. 27."""
     with patched({measured_cycles: {"STARTS": (0.0,)}}):
