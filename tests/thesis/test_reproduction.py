@@ -822,7 +822,7 @@ def test_limits_of_attraction_lie_on_the_curves() -> None:
     runs = made("system", lambda f, m: 3 * (f < 20) + 0 * m, 14)
     axes = tuple(runs.dims)
     crossover, mass = (runs[name].values for name in axes)
-    curve = Edge("flip", True, np.array([18.0, 21.0]), mass[[0, -1]])
+    curve = Edge("flip", np.array([18.0, 21.0]), mass[[0, -1]])
     attracts = crossover[:, None] < 18 + 3 * (mass - mass[0])[None, :] / np.ptp(mass)
     surveyed = Surveyed(runs, attracts, np.ones(attracts.shape, bool))
     for edges, precise in (((curve,), 0.02), ((), 1.5)):
@@ -1137,7 +1137,7 @@ def test_the_edge_of_hunting_behind_a_map(thorough_study: Reproduction) -> None:
     near = [
         (x, y)
         for edge in cycles_.edges
-        if edge.kind == "flip" and edge.symmetric
+        if edge.kind == "flip"
         for x, y in zip(edge.x, edge.y, strict=True)
         if 1.2 < y < 2.2
     ]

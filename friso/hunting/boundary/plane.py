@@ -18,7 +18,7 @@ from friso.hunting.boundary.meetings import Meeting, find_meetings, leg_shares
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.find import RTOL, Cycles, families, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
@@ -53,28 +53,41 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class _Followed:
-    """Curves followed from a grid of stages, and what was computed on the way.
+class _Grid:
+    """Grid of stages in the box of two keys: `nodes` along each side.
 
-    `points` are the coordinates of all stages of the grid, shape (points, 2), and `allowed` the numbers of the valid
-    ones. `stages` are the valid ones, and `cycles` their hunting cycles. `curves` and `gaps` are those of a `Plane`.
+    `points` are the coordinates of all, shape (points, 2), `allowed` the numbers of the valid ones, and `stages` these.
     """
 
+    nodes: int
     points: np.ndarray
     allowed: np.ndarray
     stages: Ensemble
-    cycles: Cycles
-    curves: tuple[Curve, ...]
-    gaps: list[np.ndarray]
+
+    @classmethod
+    def of(cls, space: Space, nodes: int | None) -> _Grid:
+        nodes = ContinuationSettings.current().grid_stages if nodes is None else nodes
+        points = space.grid(nodes)
+        allowed = np.flatnonzero(space.allowed(points))
+        return cls(nodes, points, allowed, space.stages(points[allowed]))
+
+    def changes(self, inside: np.ndarray, outside: np.ndarray) -> list[tuple[int, int]]:
+        """Return pairs of neighbouring points, by number: the first a stage `inside`, the second one `outside`.
+
+        Both are booleans by stage.
+        """
+        return list(_changes(*(_on_grid(self.allowed[side], self.nodes) for side in (inside, outside))))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def edge_curves(space: Space, rtol: float = RTOL, nodes: int | None = None) -> tuple[Curve, ...]:
-    """Find the curves in the plane of two keys on which the hunting cycle stops attracting, and nothing else.
+    """Find the curves in the plane of two keys on which the hunting cycle stops attracting.
 
-    The arguments and curves are those of `plane`.
+    Changes are looked for between `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
     """
-    return _followed(space, rtol, _nodes(nodes), silent).curves
+    grid = _Grid.of(space, nodes)
+    find = symmetric_cycles if grid.stages.symmetric.all() else whole_cycles
+    return _followed(space, grid, [_losing(find(grid.stages, rtol))], rtol, silent)[0]
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -84,10 +97,10 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
     Curves on which an asymmetric cycle appears that bounds its basin are found as well. Changes are looked for between
     `nodes` x `nodes` stages. Orbits are closed to the relative tolerance `rtol`.
     """
-    nodes = _nodes(nodes)
-    followed = _followed(space, rtol, nodes, progress)
-    points, allowed, stages, hunting = followed.points, followed.allowed, followed.stages, followed.cycles
-    curves, gaps = followed.curves, followed.gaps
+    grid = _Grid.of(space, nodes)
+    points, stages = grid.points, grid.stages
+    hunting, searches = _searches(stages, rtol)
+    curves, gaps = _followed(space, grid, searches, rtol, progress)
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
     if undecided.size:
@@ -95,58 +108,42 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
         surveyed = attractors(others, rtol=rtol)
         decided[undecided] = surely_surveyed(others, surveyed)
         attracts[undecided] = surveyed.attracts & decided[undecided]
-    sides = (_on_grid(allowed[decided & which], nodes) for which in (attracts, ~attracts))
-    for a, b in _changes(*sides):  # other attractors, too
+    for a, b in grid.changes(decided & attracts, decided & ~attracts):  # other attractors, too
         middle = (points[a] + points[b]) / 2
         known_gap = any(np.array_equal(middle, at) for at in gaps)
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             gaps.append(middle)
     unstable = np.any([*unstable_among(stages).values()], axis=0)
     meetings = find_meetings(space, curves, rtol)
-    return Plane(space, curves, nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
+    return Plane(space, curves, grid.nodes, grid.allowed, hunting, attracts, decided, unstable, tuple(gaps), meetings)
 
 
-def _nodes(asked: int | None) -> int:
-    return ContinuationSettings.current().grid_stages if asked is None else asked
+def _followed(
+    space: Space, grid: _Grid, searches: Sequence[CurveSearch], rtol: float, progress: Progress
+) -> tuple[tuple[Curve, ...], list[np.ndarray]]:
+    """Follow every curve that passes between neighbours of the grid, for each of the searches.
 
-
-def _followed(space: Space, rtol: float, nodes: int, progress: Progress) -> _Followed:
-    """Follow every curve that passes between neighbouring stages of a grid."""
-    points = space.grid(nodes)
-    allowed = np.flatnonzero(space.allowed(points))
-    stages = space.stages(points[allowed])
-    hunting, searches = _searches(stages, rtol)
-    changing = [
-        (cycles, [*_changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes))])
-        for cycles, inside, outside in searches
-    ]
+    Returns the curves, and the coordinates at which no curve could be begun.
+    """
+    changing = [(cycles, grid.changes(inside, outside)) for cycles, inside, outside in searches]
     tally = Tally(progress, sum(len(pairs) for _, pairs in changing))
-    parts = side_by_side([partial(_sought, space, points, allowed, *search, rtol, tally) for search in changing])
-    curves = tuple(curve for of_one, _ in parts for curve in of_one)
-    return _Followed(points, allowed, stages, hunting, curves, [gap for _, of_one in parts for gap in of_one])
+    parts = side_by_side([partial(_sought, space, grid, *search, rtol, tally) for search in changing])
+    return tuple(curve for curves, _ in parts for curve in curves), [gap for _, gaps in parts for gap in gaps]
 
 
 def _sought(
-    space: Space,
-    points: np.ndarray,
-    allowed: np.ndarray,
-    cycles: Cycles,
-    changing: Sequence[tuple[int, int]],
-    rtol: float,
-    tally: Tally,
+    space: Space, grid: _Grid, cycles: Cycles, changing: Sequence[tuple[int, int]], rtol: float, tally: Tally
 ) -> tuple[list[Curve], list[np.ndarray]]:
     """Follow the edge of hunting between grid neighbours of which only the first has the cycle.
 
-    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours, and
-    `allowed` the numbers of the valid stages among all `points`, shape (points, 2).
+    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours.
     """
-    curves: list[Curve] = []
-    gaps: list[np.ndarray] = []
+    points, curves, gaps = grid.points, list[Curve](), list[np.ndarray]()
     for a, b in changing:
         tally.add(1, CURVES)
         if any(_crossed(curve, points[a], points[b]) for curve in curves):
             continue
-        cycle = cycles.take(np.flatnonzero(allowed == a))
+        cycle = cycles.take(np.flatnonzero(grid.allowed == a))
         spot, reached = _first(space, points[a], points[b], cycle, rtol)
         if reached:  # the neighbour has the cycle too, but the search there missed it
             continue
@@ -159,7 +156,7 @@ def _sought(
 
 
 CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
-"""Cycles, and the numbers of the stages inside and outside of a curve on which they change."""
+"""Cycles, and which stages lie inside and outside of a curve on which they change, as booleans."""
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
@@ -170,14 +167,16 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]
     that may have a cycle which was not closed is on neither side.
     """
     hunting, *pairs = families(stages, rtol)
-    outside = ~hunting.attracting & ~hunting.uncertain
-    searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
+    searches = [_losing(hunting)]
     for pair in pairs:
         beside_attracting = hunting.attracting & ~pair.uncertain
-        searches.append(
-            (pair, np.flatnonzero(beside_attracting & pair.closed), np.flatnonzero(beside_attracting & ~pair.closed))
-        )
+        searches.append((pair, beside_attracting & pair.closed, beside_attracting & ~pair.closed))
     return hunting, searches
+
+
+def _losing(hunting: Cycles) -> CurveSearch:
+    """Return the search for curves on which hunting cycles cease to attract."""
+    return hunting, hunting.attracting, ~hunting.attracting & ~hunting.uncertain
 
 
 def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from friso.questions.boundary.figures import DASHES
 from friso.questions.check.figures import SHARES
 from friso.questions.map.figures import map_panel
 from friso.questions.map.findings import statement
-from friso.shown.drawing.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso.shown.drawing.figure import GREY, INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso_thesis.questions.reproduce.loops import loop_figures
 from friso_thesis.questions.reproduce.rig_figures import rig_figures
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE
@@ -39,8 +39,6 @@ MARKER = (
 )
 """Note below each map."""
 
-_HUNTING = ("edge of the attracting cycle", VERMILLION)
-_PAIR = ("edge of asymmetric cycles at its basin", PINK)
 _SHOWN_FROM = 6.0  # [s] the return move of Fig. 5 and 13 is over by then
 
 
@@ -83,10 +81,7 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
 
 
 def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
-    """Return the map with two kinds of curves.
-
-    On the first, the hunting cycle stops attracting; on the second, asymmetric cycles appear.
-    """
+    """Return the map with the curves on which the hunting cycle stops attracting."""
     figures = reproduction.cycles.get(study.name)
     if figures is None:
         return panel
@@ -95,8 +90,7 @@ def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) ->
 
 
 def _line(edge: Edge) -> Series:
-    name, colour = _HUNTING if edge.symmetric else _PAIR
-    return Series(edge.x, edge.y, f"{name} ({edge.kind})", colour, DASHES[edge.kind], 2.2)
+    return Series(edge.x, edge.y, f"edge of the attracting cycle ({edge.kind})", VERMILLION, DASHES[edge.kind], 2.2)
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:

@@ -36,12 +36,10 @@ SMALLEST = 1e-3
 class Edge:
     """A curve in a map of two keys on which a cycle stops attracting.
 
-    The curve has a kind, and its points [SI] along the two axes of the map, shape (points,) each. It also says whether
-    the cycle is the symmetric one.
+    The curve has a kind, and its points [SI] along the two axes of the map, shape (points,) each.
     """
 
     kind: Bifurcation
-    symmetric: bool
     x: np.ndarray
     y: np.ndarray
 
@@ -115,7 +113,7 @@ def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: K
     The survey of what attracts is also compared with the peaks counted in the runs.
     """
     ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
-    about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
+    about = ("edges of hunting", runs.attrs["stage"], runs.attrs["links"], ends)
     arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
     return CyclesOnMap(_from_arrays(arrays), _comparison(surveyed))
 
@@ -126,11 +124,8 @@ def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
 
 
 def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
-    count = len(arrays) // 4
-    whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "symmetric", "x", "y")} for n in range(count))
-    return tuple(
-        Edge(cast("Bifurcation", str(edge["kind"])), bool(edge["symmetric"]), edge["x"], edge["y"]) for edge in whole
-    )
+    whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "x", "y")} for n in range(len(arrays) // 3))
+    return tuple(Edge(cast("Bifurcation", str(edge["kind"])), edge["x"], edge["y"]) for edge in whole)
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
@@ -200,7 +195,7 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     curves = edge_curves(space, nodes=NODES)
     lines = [space.values(curve.points) for curve in curves]
     x, y = (swept.key for swept in ranges)
-    return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
+    return tuple(Edge(curve.kind, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
 
 
 def _range(values: np.ndarray, key: str, log: bool) -> KeyRange:
