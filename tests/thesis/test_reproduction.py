@@ -19,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Page
 from patched import patched
 from refusals import Refused
-from rig_evidence import HUNTS, grid, loops, moves, standstill, traces
+from rig_evidence import HUNTS, grid, loops, moves, rail_runs, standstill, traces
 from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
 
@@ -31,7 +31,7 @@ from friso.hunting import find_margin
 from friso.interface.output_folder import UNFINISHED, write
 from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
-from friso.studies.rig.moves_on_rails import distance
+from friso.studies.rig.moves_on_rails import RailRuns, distance
 from friso.studies.store_files import kept_arrays
 from friso.studies.study import _DECISIVE
 from friso_thesis.questions.reproduce.document import reproduce_document
@@ -54,7 +54,7 @@ from friso_thesis.studies.thesis import (
 )
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import _JUDGES, BESIDE, beside, judges, registered
-from friso_thesis.studies.thesis.cycles import Edge, Surveyed, map_cycles, survey
+from friso_thesis.studies.thesis.cycles import Edge, Surveyed, _beside_a_change, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.experiments import (
     _RUNS,
@@ -916,6 +916,25 @@ def test_experiments_are_kept_whole(tmp_path: Path) -> None:
                 with pytest.raises((ValueError, TypeError, KeyError)):
                     put_together(kind, wrong)
     assert kept.count == len(EXPERIMENTS) + 1
+
+
+def test_outcomes_of_runs_are_kept(tmp_path: Path) -> None:
+    """Words in arrays of objects, as runs have them, come back as texts: nothing is run again."""
+    kept, runs = Kept(tmp_path), rail_runs([3, 0])
+    kept.result(("runs",), RailRuns, lambda: replace(runs, outcome=runs.outcome.astype(object)))
+    assert_same(kept.result(("runs",), RailRuns, lambda: pytest.fail("they were kept")), runs)
+
+
+def test_cells_beside_another_answer_are_searched() -> None:
+    """A cell that is not valid is no neighbour; one that is undecided is searched, and so are those beside it."""
+    attracts = np.array([[True, True, True, False, False]])
+    every = np.ones((1, 5), bool)
+    assert _beside_a_change(attracts, every, every).tolist() == [[False, False, True, True, False]]
+    apart = np.array([[True, True, False, True, True]])
+    assert not _beside_a_change(attracts, every, apart)[apart].any()
+    assert _beside_a_change(~every, np.array([[False, True, True, True, True]]), every).tolist() == [
+        [True, True, False, False, False]
+    ]
 
 
 def assert_same(again: Any, made: Any) -> None:

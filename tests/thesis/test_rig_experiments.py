@@ -73,8 +73,11 @@ def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
 def test_standstill_adds_up_and_stiffness_holds() -> None:
     """Fig. 28: variances of independent disturbances add up; the free joint moves more."""
     with patched({in_position: {"SETTLING": 1.0, "WATCHED": 4.0, "DAMPING_RATIOS": (0.01, 1.0)}}):
-        standstill, kept = in_position.in_position(RIG, 1, silent)
+        standstill, kept = in_position.in_position(RIG, 1, silent, noises=(1.0, 3.0))
     assert set(kept) == {"locked", "free"}
+    alike = [standstill.runs[case, "all"].true[0, 1] for case in in_position.CASES]
+    assert standstill.louder[1.0] == pytest.approx(alike)
+    assert standstill.louder[3.0][1] > 2 * alike[1]
     for case in in_position.CASES:
         alone = [standstill.runs[case, source].true[0, 0] ** 2 for source in in_position.SOURCES[:-1]]
         assert standstill.runs[case, "all"].true[0, 0] ** 2 == pytest.approx(sum(alone), rel=0.2)

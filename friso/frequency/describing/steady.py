@@ -76,9 +76,9 @@ class Imposition:
         return bool(np.all(np.abs(one + mirrored) <= 1e-9 * np.abs(one)))
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
-        """Return friction force and rates of change of the law's own states, (1 + inner, ..., count).
+        """Return friction force and rates of change of the law's own states.
 
-        They follow from states of shape (states, ..., count).
+        They follow from states of shape (states, ..., count), and have the shape (1 + inner, ..., count).
         """
         module, at_rest = self.kernel.module, np.zeros(3)
         modes = self.kernel.modes(states, 0.0, at_rest, self.values)

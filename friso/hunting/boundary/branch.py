@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -139,11 +140,16 @@ class Tracer:
             times, place = times * np.exp(target[2] - near.time), target[:1]
         return self._closed(begin, times, place, target[None], normal, near.jacobians)[0]
 
-    def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
-        """Find the cycles on parallel planes through `targets`, (planes, 3), all at once from a cycle `near` them.
+    @cached_property
+    def chatters(self) -> bool:
+        """Tell whether a limiter of the stages on the line chatters, so that multipliers scatter."""
+        return self.family(np.zeros(1, np.int64), np.zeros(1)).chatters
 
-        Targets and the `normal`, (3,), are in the space of place, log distance and log time. Cycles that are not found
-        are left out.
+    def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
+        """Find cycles on parallel planes at once, from a cycle `near` them all.
+
+        The planes pass through `targets`, (planes, 3), with the `normal`, (3,), in the space of place, log distance and
+        log time. Cycles that are not found are left out.
         """
         begin = near.cycle.states * np.exp(targets[:, 1:2] - near.distance)
         times = near.cycle.orbits.times * np.exp(targets[:, 2] - near.time)
@@ -159,31 +165,30 @@ class Tracer:
         normal: np.ndarray,
         jacobians: np.ndarray | None = None,
     ) -> list[Point | None]:
-        """Close one cycle on each of several parallel planes; None for a plane on which none is found.
+        """Close a cycle on each of several parallel planes; None where none is found.
 
         The planes pass through `targets`, (planes, 3), with the `normal`, (3,). The search starts from `states`
         (planes, states), `times` [s] and `places`, (planes,), with `jacobians` of cycles near them if known.
         """
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at `places` along the one line that is followed."""
+            """Return the stages at `places`, all on the line that is followed."""
             return self.family(np.zeros(len(places), np.int64), places)
 
         border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
         orbits, places, jacobians = close_along(
             family, states, times, places, border, self.sign, self.rtol, self.swings, jacobians
         )
-        stages = family(np.zeros(0), places)
+        stages = self.family(np.zeros(len(places), np.int64), places)
         cycles = described(stages, orbits, self.rtol)
-        usable = cycles.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
+        usable = orbits.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
         certain = np.isfinite(jacobians).all(axis=(1, 2))
-        ones = [np.array([k]) for k in range(len(places))]
-        return [
-            Point.of(stages.take(k), float(places[k[0]]), cycles.take(k), jacobians[k] if certain[k[0]] else None)
-            if usable[k[0]]
-            else None
-            for k in ones
-        ]
+        points: list[Point | None] = [None] * len(places)
+        for k in np.flatnonzero(usable):
+            one = np.array([k])
+            jacobian = jacobians[one] if certain[k] else None
+            points[k] = Point.of(stages.take(one), float(places[k]), cycles.take(one), jacobian)
+        return points
 
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None

@@ -5,6 +5,7 @@ A multiplier passes -1 (flip), 1 (fold) or the unit circle (torus).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -151,23 +152,19 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
 
 
 def _last_step(tracer: Tracer, kind: Bifurcation, place: float) -> float:
-    """Return the step with which the search for a special point ends, in the space of place, log distance and log time.
+    """Return the step with which the search for a special point ends.
 
-    Where a limiter chatters, multipliers scatter, and those of several orbits decide in the end: the search need not
-    come nearer than a fraction of the distances of these orbits.
+    Steps are in the space of place, log distance and log time. Where a limiter chatters, multipliers scatter, and those
+    of several orbits decide in the end: the search need not come nearer than a fraction of their distances.
     """
     settings = ContinuationSettings.current()
-    if not _chatters(tracer, place):
+    if not tracer.chatters:
         return settings.special_point_step
-    return settings.chattering_step_share * _cubic_reach(tracer, kind, place)
+    return settings.chattering_step_share * _reach(tracer, kind, place)
 
 
-def _chatters(tracer: Tracer, place: float) -> bool:
-    return tracer.family(np.zeros(1, np.int64), np.array([place])).chatters
-
-
-def _cubic_reach(tracer: Tracer, kind: Bifurcation, place: float) -> float:
-    """Return how far from a special point the orbits lie through which a cubic is fitted, to either side."""
+def _reach(tracer: Tracer, kind: Bifurcation, place: float) -> float:
+    """Return how far beside a special point the orbits lie whose multipliers or places are fitted."""
     return ContinuationSettings.current().chattering_fold_reach if kind == "fold" else tracer.hundredth(place)
 
 
@@ -179,9 +176,12 @@ def _special_point(
     `direction`, shape (3,), is that of the branch, and `slope` the change of the multiplier along it. The error is
     infinite if the point cannot be computed at the tighter tolerance, or if multipliers scatter too much.
     """
-    if _chatters(tracer, point.place):
-        guess = point.vector - distance_to(kind, point) / slope * direction
-        return (_turning_point if kind == "fold" else _passed)(tracer, kind, point, guess, direction, slope)
+    if tracer.chatters:
+        step, most = -distance_to(kind, point), _last_step(tracer, kind, point.place)
+        step = float(np.clip(step / slope, -most, most)) if slope else 0.0
+        beside = _turning_point if kind == "fold" else _passed
+        located = beside(tracer, kind, point, point.vector + step * direction, direction)
+        return located or LocatedPoint(kind, point, direction, np.inf, slope)
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * ToleranceSettings.current().check_rtol_factor).solve(
         point, point.vector, direction
     )
@@ -194,53 +194,63 @@ def _special_point(
 
 
 def _passed(
-    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray, slope: float
-) -> LocatedPoint:
-    """Locate a flip or torus where a limiter chatters, by a curve through the multipliers of orbits about a guess.
+    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray
+) -> LocatedPoint | None:
+    """Locate a flip or torus by a curve through the multipliers of orbits beside a guess.
 
-    There multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key are used. They are
-    closed from the cycle `near` the `guess`, a point in the space of place, log distance and log time. `direction` is
-    that of the branch, and `slope` the change of the multiplier along it. The error is that of the curve, or what the
-    multiplier at the located point is off if larger; infinite if the point cannot be located.
+    Where a limiter chatters, multipliers scatter and may pass -1 several times, so orbits within a hundredth of the key
+    are closed, from the cycle `near` the `guess`. The guess and the `direction` of the branch, (3,), are in the space
+    of place, log distance and log time. The error is that of the curve, or the distance at which the multiplier of the
+    located point is met, if larger. Returns None if the point cannot be located.
     """
-    orbits = _about(tracer, kind, near, guess, ALONG)
-    values = np.array([distance_to(kind, point) for point in orbits])
-    passed = crossing(np.array([point.place for point in orbits]), values)
-    there = passed and tracer.solve(near, guess + (passed.place - guess[0]) * ALONG, ALONG)
+    orbits = _beside(tracer, kind, near, guess, ALONG)
+    passed = crossing(*np.array([(point.place, distance_to(kind, point)) for point in orbits]).reshape(-1, 2).T)
+    there = passed and _nearest(tracer, orbits, guess + (passed.place - guess[0]) * ALONG, ALONG)
     if not passed or not there:
-        return LocatedPoint(kind, near, direction, np.inf, slope)
+        return None
     error = max(passed.reserve, abs(distance_to(kind, there) / passed.slope))
-    return LocatedPoint(kind, there, direction, error, passed.slope * float(direction[0]))
+    within = error <= _reach(tracer, kind, passed.place)
+    return LocatedPoint(kind, there, direction, error, passed.slope * float(direction[0])) if within else None
 
 
 def _turning_point(
-    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray, slope: float
-) -> LocatedPoint:
-    """Locate a fold where a limiter chatters, by a curve through orbits about a guess, along the branch.
+    tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray
+) -> LocatedPoint | None:
+    """Locate a fold by a curve through the places of orbits beside a guess, along the branch.
 
-    There each multiplier is an average over a range of distances, and passes 1 beside the fold. The orbits are closed
-    from the cycle `near` the `guess`, a point in the space of place, log distance and log time. `direction` is that of
-    the branch, and `slope` the change of the multiplier along it. The error is infinite if the fold cannot be located.
+    Where a limiter chatters, each multiplier is an average over a range of distances, and passes 1 beside the fold. The
+    orbits are closed from the cycle `near` the `guess`, which like the `direction` of the branch, (3,), is in the space
+    of place, log distance and log time. The error reaches to the place at which the multiplier is 1. Returns None if
+    the fold cannot be located.
     """
-    orbits = _about(tracer, kind, near, guess, direction)
+    orbits = _beside(tracer, kind, near, guess, direction)
     lengths = np.array([(point.vector - guess) @ direction for point in orbits])
-    at = turn(lengths, np.array([point.place for point in orbits]))
-    there = at and tracer.solve(near, guess + at.length * direction, direction)
+    places = np.array([point.place for point in orbits])
+    at = turn(lengths, places)
+    there = at and _nearest(tracer, orbits, guess + at.length * direction, direction)
     if not at or not there:
-        return LocatedPoint(kind, near, direction, np.inf, slope)
-    return LocatedPoint(kind, there, direction, max(at.reserve, 2 * abs(there.place - at.place)), slope)
+        return None
+    slope, start = np.polyfit(lengths, [distance_to(kind, point) for point in orbits], 1)
+    order = np.argsort(lengths)
+    met = np.interp(-start / slope, lengths[order], places[order])
+    error = max(at.reserve, 2 * abs(there.place - at.place), abs(float(met) - at.place))
+    return LocatedPoint(kind, there, direction, error, float(slope))
 
 
-def _about(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray) -> list[Point]:
-    """Return orbits on both sides of a guessed special point, in steps along a direction, closed at once.
+def _beside(tracer: Tracer, kind: Bifurcation, near: Point, guess: np.ndarray, direction: np.ndarray) -> list[Point]:
+    """Return orbits on both sides of a guessed special point, in steps along a direction.
 
-    The `guess` and the `direction` (3,) are in the space of place, log distance and log time; the search starts from
-    the cycle `near` them.
+    The `guess` and the `direction`, (3,), are in the space of place, log distance and log time. The orbits are closed
+    at once, from the cycle `near` them.
     """
-    reach, settings = _cubic_reach(tracer, kind, float(guess[0])), ContinuationSettings.current()
-    return tracer.solve_all(
-        near, guess + np.linspace(-reach, reach, settings.cubic_values)[:, None] * direction, direction
-    )
+    reach, count = _reach(tracer, kind, float(guess[0])), ContinuationSettings.current().cubic_values
+    return tracer.solve_all(near, guess + np.linspace(-reach, reach, count)[:, None] * direction, direction)
+
+
+def _nearest(tracer: Tracer, orbits: Sequence[Point], target: np.ndarray, normal: np.ndarray) -> Point | None:
+    """Find the cycle on the plane through `target` with the `normal`, from the nearest of some orbits."""
+    near = min(orbits, key=lambda point: float(np.linalg.norm(point.vector - target)))
+    return tracer.solve(near, target, normal)
 
 
 def corrected(
@@ -257,10 +267,11 @@ def corrected(
 
     The point lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log
     time. The search starts from the cycle `near` the point, its approximate `states` (1, states), and the `slope` of
-    the multiplier if known. Returns None if there is no such point.
+    the multiplier if known. Returns None if there is no such point, or if its error is not known where a limiter
+    chatters.
     """
     settings = ContinuationSettings.current()
-    chatters, last_step = _chatters(tracer, float(origin[0])), _last_step(tracer, kind, float(origin[0]))
+    last_step = _last_step(tracer, kind, float(origin[0]))
     places, points = [0.0], [tracer.solve(near, origin, direction, states)]
     for _ in range(settings.special_point_tries):
         if (latest := points[-1]) is None:
@@ -269,11 +280,11 @@ def corrected(
             slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
         off, first = distance_to(kind, latest), len(points) == 1
         step = -off / slope if slope else np.inf
-        if abs(step) < last_step and (chatters or not first or abs(off) < settings.met_multiplier_error):
+        if abs(step) < last_step and (tracer.chatters or not first or abs(off) < settings.met_multiplier_error):
             special = _special_point(tracer, kind, latest, direction, slope)
-            return special if np.isfinite(special.error) or not chatters else None
+            return special if np.isfinite(special.error) or not tracer.chatters else None
         if first and not last_step <= abs(step) <= reach:
-            step = settings.slope_step
+            step = max(settings.slope_step, last_step)
         elif not abs(places[-1] + step) <= reach:
             return None
         places.append(places[-1] + step)

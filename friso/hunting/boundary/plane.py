@@ -72,9 +72,9 @@ class _Grid:
         return cls(nodes, points, allowed, space.stages(points[allowed]))
 
     def changes(self, inside: np.ndarray, outside: np.ndarray) -> list[tuple[int, int]]:
-        """Return pairs of neighbouring points, by number: the first a stage `inside`, the second one `outside`.
+        """Return pairs of neighbours on the grid, the first `inside` and the second `outside`.
 
-        Both are booleans by stage.
+        Pairs are numbers of points; both arguments are booleans by valid stage.
         """
         return list(_changes(*(_on_grid(self.allowed[side], self.nodes) for side in (inside, outside))))
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.identification.settings import ExperimentSettings
 from friso.questions.bode.figures import phases
+from friso.questions.map.words import QUIET
 from friso.shown.drawing.figure import (
     BLUE,
     GREEN,
@@ -20,10 +21,10 @@ from friso.shown.drawing.figure import (
     Axis,
     Figure,
     Limit,
+    Map,
     Panel,
     Series,
 )
-from friso_thesis.shown.rig.stroke_crossover import rails_panel
 from friso_thesis.studies.thesis.experiments import (
     BUILT,
     FREQUENCIES,
@@ -226,9 +227,20 @@ def _moves(experiments: Experiments) -> dict[str, Figure]:
 
 def _grid(experiments: Experiments) -> dict[str, Figure]:
     grid = experiments.grid
-    panel = rails_panel(grid)
+    hunts = np.where(np.isfinite(grid.share), grid.share > 0, np.nan).T
+    field = Map(
+        grid.strokes,
+        grid.crossovers,
+        hunts,
+        "Counted peaks on some rail (1) or on none (0)",
+        "",
+        colours=(QUIET, VERMILLION),
+    )
+    panel = Panel("", Axis("Stroke", "m", log=True), Axis("Crossover", "Hz"), (), maps=(field,))
     caption = (
-        f"Moves of the virtual rig, joint free, each cell on {len(grid.rails)} rails; the thesis shows counts of one."
+        f"Moves of the virtual rig, joint free, each cell on up to {len(grid.rails)} rails, until one has counted "
+        "peaks. Crossovers are tried from the highest down to the limit, and at the lowest. The thesis shows counts "
+        "of one rail."
     )
     return {"26": Figure("figure-26", "Figure 26: stroke and crossover on the rig", caption, (panel,))}
 

@@ -6,7 +6,7 @@ The experiment shows which disturbance moves the stage, and what damping recover
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -66,18 +66,18 @@ class Standstill:
 
     def of_run(self, run: int) -> Standstill:
         """Return the standstill of one run, by its number."""
-        return Standstill(*(values[[run]] for values in astuple(self)))
+        return Standstill(*(getattr(self, entry.name)[[run]] for entry in fields(self)))
 
 
 @dataclass(frozen=True)
 class InPosition:
     """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance.
 
-    There is one run for each. `frequencies` [Hz] belong to the spectra. `damped` has runs with a free joint and all
-    disturbances, by `damping` [N s/m]; `own_damping` is the joint's. `louder` has the largest deviations [m] locked and
-    free, by the factor on the force noise. `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the
-    stage states the floor. `after_move` has, by case, runs with all disturbances after the move, as long after it as
-    other runs after their start.
+    There is one run for each, and one for each louder noise of the force. `frequencies` [Hz] belong to the spectra.
+    `damped` has runs with a free joint and all disturbances, by `damping` [N s/m]; `own_damping` is the joint's.
+    `louder` has the largest deviations [m] locked and free, by the factor on the force noise. `amplifier` is the
+    RMS [N] of the force noise; `own_floor` says whether the stage states the floor. `after_move` has, by case, runs
+    with all disturbances after the move, as long after it as other runs after their start.
     """
 
     crossover: float
@@ -128,10 +128,10 @@ def in_position(
     step = as_built_keys(stage)["drive.sample_time"]
     noisy = with_noise(standing(0.0, SETTLING + WATCHED), force, seed, step)
     after_move = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
-    louder_names = [f"{factor:g} times the noise" for factor in noises]
+    # "all" stands first: its run is the one recorded
     plans = (
         (quiet, {"encoder": 0.0, "amplifier": 1.0}),
-        (shaken, {"all": 1.0, "floor": 0.0} | dict(zip(louder_names, noises, strict=True))),
+        (shaken, {"all": 1.0, "floor": 0.0} | {_louder(factor): factor for factor in noises}),
     )
     runs, recordings, after = {}, {}, {}
     for done, (case, locked) in enumerate(CASES.items()):
@@ -146,8 +146,8 @@ def in_position(
                 recordings[case] = (recorded, fixed)
                 after[case] = _standstill(_recorded(fixed, after_move, seed), SETTLING)
     progress(len(CASES), len(CASES) + 1, "joint free, more and less damping")
-    peaks = {name: tuple(float(runs[case, name].true[0, 1]) for case in CASES) for name in louder_names}
-    louder = dict(zip(noises, peaks.values(), strict=True))
+    peaks = {key: float(stands.true[0, 1]) for key, stands in runs.items()}
+    louder = {factor: (peaks["locked", _louder(factor)], peaks["free", _louder(factor)]) for factor in noises}
     flat = stage.flat()
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
@@ -159,6 +159,10 @@ def in_position(
         FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
         float(flat["joint.damping"]), damped, traces, louder,
     ), recordings  # fmt: skip
+
+
+def _louder(factor: float) -> str:
+    return f"all, {factor:g} times the force noise"
 
 
 def amplifier_noise(stage: Stage) -> float:

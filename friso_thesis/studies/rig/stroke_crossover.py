@@ -27,11 +27,12 @@ CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
 """Crossovers relative to the stage's. The range is that of the thesis's rig (Table 3, Fig. 16); the steps are our
 choice."""
 
-AT_ONCE = 5
-"""Rails tried at once on a cell of the grid, before more are needed to find any with peaks."""
-
 STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
 """Strokes relative to the stage's: up to 1 mm in Table 3. The steps are our choice."""
+
+AT_ONCE = 5
+"""Number of rails tried at once on a cell of which only is asked whether any rail has peaks (our choice). Fewer leave
+processors idle, more are run in vain."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +118,11 @@ def stroke_crossover(
 def limits_of_crossover(
     stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray
 ) -> StrokeCrossover:
-    """Run the move on a grid of strokes and crossovers, but no more runs than its limits need.
+    """Run the move on a grid of strokes and crossovers, as far as its limits need.
 
     For each stroke, crossovers are tried from the highest down, to the first at which some rail has counted peaks; the
     lowest is always tried. No more rails are run on a cell once one has peaks. Runs left out have the outcome "failed".
-    The arguments are those of `stroke_crossover`.
+    The arguments are those of `stroke_crossover`, for a stage with a [rail].
     """
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     shape = len(sizes), len(frequencies), len(seeds)

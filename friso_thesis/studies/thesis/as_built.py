@@ -153,7 +153,7 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Run moves with the rig's real drive over strokes and crossovers, as the limits of hunting need (Fig. 26)."""
+    """Run moves with the real drive over strokes and crossovers, as far as limits need (Fig. 26)."""
     seeds = 1.0 + np.arange(float(RAILS))
     return limits_of_crossover(with_joint(_prescribed(stage), locked=False), SEED, STROKES, LOOPS, seeds)
 

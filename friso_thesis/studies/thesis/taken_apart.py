@@ -28,7 +28,7 @@ def taken_apart(result: Any) -> dict[str, np.ndarray]:
 
 def _tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     if isinstance(value, np.ndarray):
-        arrays[str(len(arrays))] = value
+        arrays[str(len(arrays))] = value.astype(str) if value.dtype == object else value
         return len(arrays) - 1
     if is_dataclass(value):
         return {field.name: _tree(getattr(value, field.name), arrays) for field in fields(value)}

@@ -139,7 +139,7 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
             Part(
                 "at the highest crossover no peaks are counted at any stroke, at the lowest some are at every stroke",
                 bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
-                f"none above {named} ({len(grid.rails)} rails a cell). {_ASSUMED}",
+                f"none above {named} (up to {len(grid.rails)} rails a cell). {_ASSUMED}",
             ),
             Part(
                 "the limit of the crossover falls with the stroke, as in Fig. 16A (rank correlation at most "
