@@ -530,6 +530,18 @@ def test_windows_are_told_beside_the_edge() -> None:
     assert "40.04 Hz" in unsure
 
 
+def test_where_the_loop_is_unstable_friction_is_not_said_to_make_the_stage_hunt() -> None:
+    """From 8 Hz, the loop is unstable above 31.1 Hz; what attracts from 31.4 Hz (± 1 %) on is due to that."""
+    hunting = BandwidthWindow(AttractionEnd(3.93, 3.89, True), None)
+    lost = BandwidthWindow(AttractionEnd(3.893, 3.8929, True), None)
+    says = sentence(settles(windows=(hunting,)), unstable_bandwidths=(lost,))
+    assert "31.14 Hz" in says
+    assert "31.4 Hz" not in says
+    assert "31.4 Hz" in sentence(settles(windows=(hunting,)))
+    below = BandwidthWindow(None, AttractionEnd(0.6998, 0.7064, True))
+    assert sentence(settles(), unstable_bandwidths=(below,)).count("5.60 Hz") == 1  # not as the edge of hunting, too
+
+
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
 @example(1.00499 / 8, 5.085e-3)
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:

@@ -7,8 +7,10 @@ import pytest
 from variants import VARIANTS
 
 import friso
-from friso.hunting import Ensemble, unstable
+from friso.equations.bandwidth import faster
+from friso.hunting import AttractionEnd, BandwidthWindow, Ensemble, loops_unstable, unstable
 from friso.hunting.loop import at_lower_gains
+from friso.hunting.margin import unstable_bandwidths
 from friso.hunting.settings import CheckSettings
 from friso.stage import Stage
 
@@ -154,3 +156,35 @@ def test_an_unstable_loop_is_mentioned_before_work_that_takes_minutes(
 def test_an_unstable_loop_is_mentioned_beside_a_run(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
     friso.simulate(rig.replace({"controller.alpha": 0.9}))
     assert any("is unstable while the stage sticks and while" in text for text in caplog.messages)
+
+
+@pytest.mark.inner
+def test_a_loop_is_unstable_just_inside_the_bandwidths_stated_and_stable_just_outside() -> None:
+    """A cascade with filters on a parasitic mode is unstable over a range of bandwidths, and stable again above it."""
+    chosen = friso.load(friso.example("twincat_cascade"))
+    (window,) = unstable_bandwidths(chosen)
+    for end in (window.low, window.high):
+        assert end is not None
+        assert end.reserve < 2e-4
+        places = np.array([end.inside, end.outside, 1.0])
+        assert loops_unstable(faster(chosen.flat(), places), 3).tolist() == [True, False, False]
+
+
+@pytest.mark.inner
+def test_what_lies_outside_of_another_window_is_left() -> None:
+    def window(low: float | None, high: float | None, reserve: float = 0.0) -> BandwidthWindow:
+        low_end = None if low is None else AttractionEnd(low, low * (1 - reserve), True)
+        return BandwidthWindow(low_end, None if high is None else AttractionEnd(high, high * (1 + reserve), True))
+
+    lost = window(3.89, 8.0)
+    for whole, left in (
+        (window(3.93, None, 0.01), [(8.0, None)]),
+        (window(3.93, 7.0, 0.01), []),
+        (window(3.88, 7.0, 0.01), []),
+        (window(2.0, 5.0), [(2.0, 3.89)]),
+        (window(2.0, None), [(2.0, 3.89), (8.0, None)]),
+        (window(None, 3.0), [(None, 3.0)]),
+        (window(9.0, None), [(9.0, None)]),
+    ):
+        parts = whole.without(lost)
+        assert [(part.low and part.low.inside, part.high and part.high.inside) for part in parts] == left

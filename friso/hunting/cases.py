@@ -25,8 +25,10 @@ from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.limits import SEARCH_LIMITS
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.many_stages import kernels_to_judge
+from friso.hunting.margin import unstable_bandwidths
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.motions import keeps_moving
+from friso.hunting.outward import BandwidthWindow
 from friso.hunting.parameter_margin import ParameterMargin
 from friso.hunting.settings import CheckSettings, ToleranceSettings
 from friso.hunting.stage_margins import friction_margin, keeps_friction_margin
@@ -70,6 +72,7 @@ class Case:
       may move the stage. A motion with less force leaves a stage without a free joint `unmoved`.
     - `force_limit` [N]: the controller's limit, if it holds the stage off its reference (None: it does not).
     - `unstable`: states in which the loop is unstable regardless of friction (see `friso.hunting.loop`).
+    - `unstable_bandwidths`: bandwidths at which it is so, for a stage that may hunt.
     - `unstable_as_built`: states in which only sampling and delay make it unstable.
     - `feeding`: with a backlash, the cause without which hunting ends (None also if the search took too much work).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
@@ -95,6 +98,7 @@ class Case:
     breakaway: float = 0.0
     force_limit: float | None = None
     unstable: tuple[LoopState, ...] = ()
+    unstable_bandwidths: tuple[BandwidthWindow, ...] = ()
     unstable_as_built: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
@@ -263,6 +267,7 @@ def _case(
         breakaway=breakaway,
         force_limit=_holding_limit(flat, runs, judgement, breakaway) if status == Status.DONE else None,
         unstable=unstable(stage),
+        unstable_bandwidths=unstable_bandwidths(stage) if judgement.hunting.possible else (),
         feeding=fed,
         dwells=dwells(stage, rtol) if len(stands(flat)) > 2 and status == Status.DONE else (),
         tracking=tracking(stage, rtol) if keeps_moving(flat) else None,

@@ -14,8 +14,9 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.limits import SEARCH_LIMITS
+from friso.hunting.loop import unstable_among
 from friso.hunting.outward import AttractionEnd, BandwidthWindow, Beyond, EdgeSearch
-from friso.hunting.settings import EdgeSettings
+from friso.hunting.settings import CheckSettings, EdgeSettings
 from friso.hunting.what_attracts import sketched, what_attracts
 from friso.stage import Stage
 
@@ -116,6 +117,35 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     inside = None if crossover is None else crossover * end.inside
     outermost = Margin(end.inside, inside, certain and not contradicts, end.outside)
     return SearchedBandwidths(outermost, windows, lower, contradicts)
+
+
+def unstable_bandwidths(stage: Stage) -> tuple[BandwidthWindow, ...]:
+    """Find the bandwidths of `SEARCH_LIMITS` at which the loop of a stage is unstable, whatever the friction.
+
+    The loop is unstable while the stage sticks, or while it slides. Windows narrower than a step may be missed.
+    """
+    count = CheckSettings.current().loop_bandwidths
+
+    def unstable(factors: np.ndarray) -> np.ndarray:
+        """Tell at which factors of the stage's bandwidth its loop is unstable."""
+        states = unstable_among(Ensemble.held(faster(stage.flat(), factors), len(factors)))
+        return np.any([*states.values()], axis=0)
+
+    def end(inside: float, outside: float) -> AttractionEnd:
+        """Return where the loop becomes stable between a factor at which it is not, and one at which it is."""
+        between = np.geomspace(inside, outside, count)
+        last = int(np.flatnonzero(~unstable(between))[0]) - 1
+        return AttractionEnd(*between[last : last + 2].tolist(), certain=True)
+
+    factors = np.geomspace(LOWEST, HIGHEST, count)
+    changes = np.flatnonzero(np.diff(unstable(factors).astype(int), prepend=0, append=0))
+    return tuple(
+        BandwidthWindow(
+            end(factors[first], factors[first - 1]) if first else None,
+            end(factors[after - 1], factors[after]) if after < count else None,
+        )
+        for first, after in zip(changes[::2], changes[1::2], strict=True)
+    )
 
 
 class _Grid:

@@ -55,7 +55,7 @@ class AttractionEnd:
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """A window of bandwidths in which a stage hunts, by its ends `low` and `high`.
+    """A window of bandwidths in which a stage hunts, or its loop is unstable, by its ends `low` and `high`.
 
     The ends are in factors of the stage's own bandwidth (None: the window reaches the end of the search).
     """
@@ -67,6 +67,29 @@ class BandwidthWindow:
         """Tell whether a factor of the stage's own bandwidth lies in this window."""
         low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
         return low <= factor <= high
+
+    def without(self, other: BandwidthWindow) -> tuple[BandwidthWindow, ...]:
+        """Return the parts of this window below and above another one; where both overlap, the other counts.
+
+        A part that is narrower than the error of an end is left out.
+        """
+        if (other.high and not self._reaches(other.high, -1)) or (other.low and not self._reaches(other.low, 1)):
+            return (self,)
+        parts = []
+        if other.low and self._reaches(other.low, -1):
+            parts.append(
+                BandwidthWindow(self.low, replace(other.low, inside=other.low.outside, outside=other.low.inside))
+            )
+        if other.high and self._reaches(other.high, 1):
+            parts.append(
+                BandwidthWindow(replace(other.high, inside=other.high.outside, outside=other.high.inside), self.high)
+            )
+        return tuple(parts)
+
+    def _reaches(self, place: AttractionEnd, side: int) -> bool:
+        """Tell whether part of this window surely lies above (`side` 1) or below (-1) the end of another one."""
+        end = self.high if side > 0 else self.low
+        return end is None or side * (end.inside / place.inside - 1) > end.reserve + place.reserve
 
 
 @dataclass

@@ -235,6 +235,9 @@ class CheckSettings(Settings):
     loops_at_once: int = setting(256, "")
     """Loops of a map that are analysed together, at 0.1 MB each."""
 
+    loop_bandwidths: int = setting(200, "")
+    """Bandwidths at which the loop's stability is computed, 2 % apart, and again between two of these, 0.01 % apart."""
+
     least_followed_time: float = setting(1000.0, "s")
     """Shortest time for which motions that have not settled are continued."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,18 @@ from friso.shown.documents import dwells_document, plain_json, tracking_document
 from friso.stage.tables import passive_where
 
 if TYPE_CHECKING:
-    from friso.hunting import AttractionEnd, Case, Cycle, Feeding, Judgement, Margin, MarginEnd, ParameterMargin, Swing
+    from friso.hunting import (
+        AttractionEnd,
+        BandwidthWindow,
+        Case,
+        Cycle,
+        Feeding,
+        Judgement,
+        Margin,
+        MarginEnd,
+        ParameterMargin,
+        Swing,
+    )
     from friso.remedies.suggestion import Suggestion
     from friso.shares import Share
     from friso.stage import Stage
@@ -88,7 +99,7 @@ def _case(case: Case) -> dict[str, Any]:
         "reason": judgement.hunting.reason or None,
         "settled_after_s": judgement.settled_after,
         "margin": _margin(judgement.margin) if judgement.margin else None,
-        "windows": [{"low": _end(window.low), "high": _end(window.high)} for window in judgement.windows],
+        "windows": _windows(judgement.windows),
         "settles_below": _end(judgement.lower),
         "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
         "advice_keeps_friction": case.advice_keeps_friction,
@@ -98,6 +109,7 @@ def _case(case: Case) -> dict[str, Any]:
         "observed": judgement.observed,
         "given_up": judgement.given_up,
         "loop_unstable_while_it": case.unstable,
+        "loop_unstable_bandwidths": _windows(case.unstable_bandwidths),
         **({"loop_unstable_as_built_while_it": case.unstable_as_built} if case.unstable_as_built else {}),
         **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
         **({"dwells": dwells_document(case.dwells)} if case.dwells else {}),
@@ -149,6 +161,11 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
         "displacements_given_up": judgement.displacement.unknown,
         "velocities_given_up": judgement.push.unknown,
     }
+
+
+def _windows(windows: Iterable[BandwidthWindow]) -> list[dict[str, Any]]:
+    """Return windows of bandwidths by their ends."""
+    return [{"low": _end(window.low), "high": _end(window.high)} for window in windows]
 
 
 def _margin(edge: Margin) -> dict[str, Any]:

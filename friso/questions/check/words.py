@@ -81,7 +81,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if CheckPart.FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
-    after += friction_sentences(case)
+    after += [*_loop_lost(case), *friction_sentences(case)]
     stands = dwell_sentences(case.dwells) if case.verdict not in ATTRACTED else []
     sentences = [says[case.verdict](case), *stands, *feeds, *_doubts(case), *_running_away(case), *after]
     return _after_loop(case, " ".join(sentences))
@@ -335,10 +335,10 @@ def _outlook(case: Case) -> list[str]:
     """Say at which other bandwidths the stage hunts, or that none was found."""
     judgement = case.judgement
     says: list[str] = []
-    if judgement.margin:
+    if judgement.margin and not any(window.holds(judgement.margin.factor) for window in case.unstable_bandwidths):
         up_to = "below" if judgement.margin.certain else "up to"
         says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
-    elif judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
+    elif not judgement.margin and judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
         says.append(f"No hunting was found down to {percent(SEARCH_LIMITS.lowest_bandwidth)} of this bandwidth.")
     return [*says, *_windows(case), *_unsearched(case)]
 
@@ -402,16 +402,25 @@ def _elsewhere(case: Case) -> str | None:
 
 
 def _windows(case: Case) -> list[str]:
-    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again.
+    """Say in which ranges of the bandwidth, beyond the edge, the stage hunts again, and its loop is stable.
 
     The list is empty if there are no such ranges.
     """
-    places = [_window(case, window) for window in case.judgement.windows]
+    windows = list(case.judgement.windows)
+    for lost in case.unstable_bandwidths:
+        windows = [part for window in windows for part in window.without(lost)]
+    places = [_window(case, window) for window in windows]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
+def _loop_lost(case: Case) -> list[str]:
+    """Say at which bandwidths friction does not matter, because the loop is unstable; empty without any."""
+    places = [_window(case, window) for window in case.unstable_bandwidths]
+    return [f"The loop itself is unstable, whatever the friction, {listed(places, 'and')}."] if places else []
+
+
 def _window(case: Case, window: BandwidthWindow) -> str:
-    """Write a range of bandwidths, beyond the edge of hunting, in which the stage hunts again."""
+    """Write a range of bandwidths, such as one beyond the edge of hunting in which the stage hunts again."""
     low, high = window.low, window.high
     if low and high and high.inside < low.inside * ONE_PLACE:
         width = percent(high.inside / low.inside - 1)
@@ -457,7 +466,10 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
     still = "is still possible" if judgement.hunting.certain else "was still found"
     tune = "" if ways else " friso tune looks for other settings."
-    return [f"Hunting {still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth.{tune}", *says, *lower]
+    highest = f"at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth"
+    lost = any(window.high is None for window in item.case.unstable_bandwidths)
+    to_the_top = f"{still} up to where the loop itself is unstable" if lost else f"{still} {highest}"
+    return [f"Hunting {to_the_top}.{tune}", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
