@@ -146,19 +146,19 @@ def _percent(part: int, total: int) -> str:
 
 
 def verification(runs: xr.Dataset) -> str:
-    """Say how many checked outcomes survive a tighter tolerance, with the 95 % interval.
+    """Say how many cells of a map, run again at a tighter tolerance, end as in the map, with the 95 % interval.
 
     The interval is by Clopper and Pearson.
     """
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:
-        return "Not verified: no outcome was checked at a tighter tolerance."
+        return "Not verified: no cell was run again at a tighter tolerance."
     surviving = int(runs.attrs["verified_surviving"])
     low, high = share_interval(surviving, checked)
     rtol = float(runs.attrs["verified_rtol"])
     text = (
-        f"{percent(surviving / checked, 3)} of {grouped(checked)} outcomes are the same at rtol {rtol:g} "
-        f"(95 % confidence: {percentage(low)} to {percentage(high)} %)."
+        f"Of {grouped(checked)} cells run again at the tighter rtol {rtol:g}, {percent(surviving / checked, 3)} end as "
+        f"before (95 % confidence: {percentage(low)} to {percentage(high)} %)."
     )
     if inferred := int(runs.attrs.get("inferred_checked", 0)):
         confirmed = int(runs.attrs["inferred_confirmed"])
