@@ -136,7 +136,13 @@ def fake_stage(
             speeds_up=PidGains.speeds_up,
         ),
         motion=SimpleNamespace(duration=duration),
-        flat=lambda: {"motion.kind": "hold", "motion.duration": duration},
+        flat=lambda: {
+            "motion.kind": "there_and_back",
+            "motion.acceleration": 100.0,
+            "motion.acceleration_time": 0.03,
+            "motion.return_at": 0.0,
+            "motion.duration": duration,
+        },
         to_toml=lambda: f"name = {json.dumps(name)}\n",
     )
 

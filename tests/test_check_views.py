@@ -530,6 +530,15 @@ def test_windows_are_told_beside_the_edge() -> None:
     assert "40.04 Hz" in unsure
 
 
+def test_a_share_of_moves_is_told_with_the_moves_tried() -> None:
+    """In the sentence and in the table: 128 moves, within the ranges from which they were drawn."""
+    bistable = hunts(verdict="bistable")
+    table = tabled(bistable)
+    for text in (sentence(bistable), f"{table['Moves that end in hunting']} {table['Moves tried']}"):
+        for fact in ("87 %", "128", "10.0 to 200 m/s", "3.00 to 60.0 ms"):
+            assert fact in text
+
+
 def test_where_the_loop_is_unstable_friction_is_not_said_to_make_the_stage_hunt() -> None:
     """From 8 Hz, the loop is unstable above 31.1 Hz; what attracts from 31.4 Hz (± 1 %) on is due to that."""
     hunting = BandwidthWindow(AttractionEnd(3.93, 3.89, True), None)

@@ -1566,6 +1566,9 @@ def test_the_parts_of_the_goal_that_the_stage_misses_are_told(tuning: Advice) ->
     attracted = says("hunting", settling=range(10), hunting=range(5, 20))
     assert "25 % of the machines that meet the rest hunt or may hunt" in attracted
     assert "6 % of 50 machines and moves miss one part" in says("together", margin=range(3))
+    drawn = replace(made_up(50, settling=range(6))[1], moves_drawn=MoveRange(1e-3, 5e-3, (1.0, 3.0)))
+    sized = as_it_is(replace(tuning, case=quiet, goal=FORCE_LIMITED, present=drawn, unmet=("settling",)))
+    assert "12 % of 50 moves of 1.00 to 5.00 mm with 1.00 to 3.00 m/s² do not settle" in sized
     assert says("distance") == f"As it is: no limit cycle, but {DOUBTS['distance']}."
     doubtful = replace(
         quiet, judgement=replace(quiet.judgement, hunting=replace(quiet.judgement.hunting, certain=False))

@@ -13,7 +13,7 @@ from friso.hunting import CheckPart
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
-from friso.questions.check.words import at_the_end, edge_text
+from friso.questions.check.words import at_the_end, edge_text, moves_tried
 from friso.shown.cases import BANDS, ShownCase
 from friso.shown.drawing.prefixes import (
     NOTHING,
@@ -164,6 +164,12 @@ def _moves(case: Case) -> str:
     return f"{percent(moves.fraction)} ({percent_range(low, high)}) of {moves.count} moves"
 
 
+def _moves_tried(case: Case) -> str:
+    """Write from which ranges of the motion's keys moves were drawn."""
+    moves = case.judgement.moves
+    return f"{moves_tried(case, moves)}, evenly" if moves else NOTHING
+
+
 def _peaks(case: Case) -> str:
     """Write the peak count, and why it may contradict the verdict.
 
@@ -219,6 +225,7 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
     "Pushes that hunt": lambda case: _kicks(case, case.judgement.push, "m/s"),
     "Moves that end in hunting": _moves,
+    "Moves tried": _moves_tried,
     "Peak to peak, last quarter": at_the_end,
     "Period, last quarter": lambda case: with_unit(case.period, "s"),
     "Largest error on the way": _tracked(lambda tracking: tracking.largest),

@@ -18,6 +18,7 @@ from friso.shown.drawing.prefixes import (
     length_at_rest,
     listed,
     plus_minus,
+    range_with_unit,
     rounded_down,
     rounded_up,
     with_unit,
@@ -25,10 +26,12 @@ from friso.shown.drawing.prefixes import (
 from friso.shown.loop_words import unstable_where
 from friso.shown.motion_words import dwell_sentences, following_sentence
 from friso.stage.controllers import FORCE_LIMIT
+from friso.stage.motion import motion_of
+from friso.stage.section import numeric_fields
 from friso.stage.standstill import integral_leak
 
 if TYPE_CHECKING:
-    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin
+    from friso.hunting import AttractionEnd, BandwidthWindow, Case, Kick, Margin, MoveShare
     from friso.hunting.criteria import Verdict
 
 _MICRON, _TEN_MICRON = BANDS
@@ -161,10 +164,8 @@ def _bistable(case: Case) -> str:
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
-        least, most = SEARCH_LIMITS.move_shares
-        keys = listed([key.partition(".")[2].replace("_", " ") for key in moves.ranges], "and")
-        like = f"this move at {least:g} to {most:g} times its {keys}"
-        starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
+        spread = f"spread evenly over {moves_tried(case, moves)}"
+        starts.append(f"{percent(moves.fraction)} of the {moves.count} moves tried ({spread})")
     first = f"settles after this move{_later(case)}{_stuck(case)}"
     if not starts and CheckPart.STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
@@ -175,6 +176,17 @@ def _bistable(case: Case) -> str:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
     return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+
+
+def moves_tried(case: Case, moves: MoveShare) -> str:
+    """Write from which ranges of the motion's keys moves were drawn, such as "acceleration 10.0 to 200 m/s²"."""
+    fields = numeric_fields(motion_of(case.stage.flat()))
+    named = {key.partition(".")[2]: ends for key, ends in moves.ranges.items()}
+    ranges = [
+        f"{name.replace('_', ' ')} {range_with_unit(*ends, getattr(fields[name], 'unit', ''))}"
+        for name, ends in named.items()
+    ]
+    return listed(ranges, "and")
 
 
 def _following(case: Case) -> str:

@@ -8,8 +8,9 @@ import numpy as np
 
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.quantities import percent
+from friso.remedies.machines import MoveRange
 from friso.remedies.method import Advice
-from friso.shown.drawing.prefixes import listed, with_unit
+from friso.shown.drawing.prefixes import listed, range_with_unit, with_unit
 
 DOUBTS = {
     "verdict": "its own motion does not settle, or something attracts it",
@@ -26,6 +27,12 @@ DOUBTS = {
     "together": "too many of the machines miss one part of the goal or another",
 }
 """Why a stage is not sure to meet the goal."""
+
+
+def moves_words(moves: MoveRange) -> str:
+    """Write from which sizes and accelerations moves are drawn."""
+    sizes = f"moves of {range_with_unit(moves.smallest, moves.largest, 'm')}"
+    return f"{sizes} with {range_with_unit(*moves.accelerations, 'm/s^2')}" if moves.accelerations else sizes
 
 
 def as_it_is(tuning: Advice) -> str:
@@ -53,9 +60,10 @@ def _missed(name: str, tuning: Advice) -> str:
         return DOUBTS[name]
     missing = percent(float(np.mean(~meets.get(name, every))))
     late = "before the return or the end of the run" if goal.settle is None else f"within {with_unit(goal.settle, 's')}"
+    made = "moves" if present.moves_drawn is None else moves_words(present.moves_drawn)
     return {
-        "settling": f"{missing} of {len(every)} moves do not settle {late}",
+        "settling": f"{missing} of {len(every)} {made} do not settle {late}",
         "margin": f"{missing} of {len(every)} machines have less modulus margin than {goal.margin:g}",
-        "force": f"{missing} of {len(every)} moves take more force than {with_unit(goal.force_limit or 0.0, 'N')}",
-        "together": f"{missing} of {len(every)} machines and moves miss one part of the goal or another",
+        "force": f"{missing} of {len(every)} {made} take more force than {with_unit(goal.force_limit or 0.0, 'N')}",
+        "together": f"{missing} of {len(every)} machines and {made} miss one part of the goal or another",
     }[name]

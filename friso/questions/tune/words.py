@@ -22,7 +22,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.platform.extras import install
 from friso.quantities import Quantity, percent, positive
 from friso.questions.design.words import leaf_words
-from friso.questions.tune.present_words import DOUBTS, as_it_is
+from friso.questions.tune.present_words import DOUBTS, as_it_is, moves_words
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.least import LEAST
@@ -210,9 +210,7 @@ def goal_words(goal: Goal) -> str:
     late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
     most, moves = goal.bandwidth_limit, goal.moves
-    moving = "" if moves is None else f" after moves of {range_with_unit(moves.smallest, moves.largest, 'm')}"
-    if moves is not None and moves.accelerations is not None:
-        moving += f" with {range_with_unit(*moves.accelerations, 'm/s^2')}"
+    moving = "" if moves is None else f" after {moves_words(moves)}"
     limit = "" if most is None else f" and a bandwidth of at most {with_unit(most, 'Hz')}"
     return (
         f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{moving}{force}, "
@@ -688,10 +686,11 @@ def assumptions(tuning: Advice) -> list[str]:
         lines.append("Gains and isolator were not tried together, as each works alone.")
     if any(outcome.remedy.buys_joint and outcome not in tuning.recommended for outcome in tuning.working):
         lines.append("Leaf springs were sized only for joints of what is told first; friso design sizes others.")
+    spread = ", spread evenly over the logarithm" * (machines.moves.smallest < machines.moves.largest)
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
-        "each with a move of its own."
+        f"each with a move of its own: {moves_words(machines.moves)}{spread}."
     )
     lines += spread_sentences(machines.from_file, machines.spreads)
     held = [key for key in tuning.complete(stage).uncertain() if key.startswith("drive.")]
