@@ -1,6 +1,7 @@
 """Whether a loop is stable, friction aside, against the criterion of Hurwitz."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ import friso
 from friso.equations.bandwidth import faster
 from friso.hunting import AttractionEnd, BandwidthWindow, Ensemble, loops_unstable, unstable
 from friso.hunting.loop import at_lower_gains
-from friso.hunting.margin import unstable_bandwidths
-from friso.hunting.settings import CheckSettings
+from friso.hunting.margin import search_bandwidths, unstable_bandwidths
+from friso.hunting.settings import CheckSettings, EdgeSettings
 from friso.stage import Stage
 
 
@@ -188,3 +189,54 @@ def test_what_lies_outside_of_another_window_is_left() -> None:
     ):
         parts = whole.without(lost)
         assert [(part.low and part.low.inside, part.high and part.high.inside) for part in parts] == left
+
+
+LAGGED = """
+name = "cascade whose velocity is low-passed"
+masses = { stage = "8 kg" }
+
+[motion]
+kind = "there_and_back"
+duration = "20 s"
+acceleration = "3 m/s^2"
+acceleration_time = "80 ms"
+return_at = "5 s"
+
+[friction]
+model = "lugre"
+static = "12 N"
+coulomb = "8 N"
+stribeck_velocity = "2 mm/s"
+stribeck_exponent = 2
+viscous = "30 N*s/m"
+bristle_stiffness = "3 N/um"
+bristle_damping = "1500 N*s/m"
+
+[controller]
+kind = "cascade"
+kv = "60 1/s"
+kp = "2513 N*s/m"
+velocity_integral_time = "0.1 s"
+force_limit = "2513 N"
+anti_windup = "clamp"
+
+[[controller.filters]]
+kind = "low_pass"
+path = "feedback"
+frequency = "159 Hz"
+order = 2
+damping_ratio = 1.0
+"""
+
+
+@pytest.mark.inner
+def test_where_the_loop_is_unstable_no_bandwidth_is_left_undecided(tmp_path: Path) -> None:
+    """That hunting was not determined, for its work, was told of bandwidths at which the loop is unstable alone."""
+    (tmp_path / "lagged.toml").write_text(LAGGED, encoding="utf-8")
+    chosen = friso.load(tmp_path / "lagged.toml")
+    (window,) = unstable_bandwidths(chosen)
+    with EdgeSettings(simulated_work=1e6).in_use():
+        sought = search_bandwidths(chosen, attracting=False)
+    assert (sought.margin, sought.undecided) == (None, False)
+    assert window.low is not None
+    assert [part for hunting in sought.windows for part in hunting.without(window)] == []

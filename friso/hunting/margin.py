@@ -60,7 +60,7 @@ class SearchedBandwidths:
     - `lower`: for a stage that hunts, the bandwidth below which it does not (None: there is none).
     - `contradicts`: an orbit was followed to a stage that seemed to have no attractor.
     - `to_the_top`: the stage hunts up to the highest bandwidth, so that there is no edge.
-    - `undecided`: no edge was found, but the stage may hunt at some bandwidth.
+    - `undecided`: no edge was found, but the stage may hunt at some bandwidth at which its loop is stable.
     """
 
     margin: Margin | None
@@ -111,7 +111,7 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
         to_the_top = bool((grid.attracts & grid.decided)[index:].all())
-        undecided = not grid.decided[grid.lowest :].all()
+        undecided = not (grid.decided | _unstable(flat, factors))[grid.lowest :].all()
         return SearchedBandwidths(None, windows, lower, contradicts, to_the_top, undecided)
     _, end, certain = edge
     inside = None if crossover is None else crossover * end.inside
@@ -124,28 +124,30 @@ def unstable_bandwidths(stage: Stage) -> tuple[BandwidthWindow, ...]:
 
     The loop is unstable while the stage sticks, or while it slides. Windows narrower than a step may be missed.
     """
-    count = CheckSettings.current().loop_bandwidths
-
-    def unstable(factors: np.ndarray) -> np.ndarray:
-        """Tell at which factors of the stage's bandwidth its loop is unstable."""
-        states = unstable_among(Ensemble.held(faster(stage.flat(), factors), len(factors)))
-        return np.any([*states.values()], axis=0)
+    count, flat = CheckSettings.current().loop_bandwidths, stage.flat()
 
     def end(inside: float, outside: float) -> AttractionEnd:
         """Return where the loop becomes stable between a factor at which it is not, and one at which it is."""
         between = np.geomspace(inside, outside, count)
-        last = int(np.flatnonzero(~unstable(between))[0]) - 1
+        last = int(np.flatnonzero(~_unstable(flat, between))[0]) - 1
         return AttractionEnd(*between[last : last + 2].tolist(), certain=True)
 
     factors = np.geomspace(LOWEST, HIGHEST, count)
-    changes = np.flatnonzero(np.diff(unstable(factors).astype(int), prepend=0, append=0))
+    places = factors.tolist()
+    changes = np.flatnonzero(np.diff(_unstable(flat, factors).astype(int), prepend=0, append=0))
     return tuple(
         BandwidthWindow(
-            end(factors[first], factors[first - 1]) if first else None,
-            end(factors[after - 1], factors[after]) if after < count else None,
+            end(places[first], places[first - 1]) if first else None,
+            end(places[after - 1], places[after]) if after < count else None,
         )
         for first, after in zip(changes[::2], changes[1::2], strict=True)
     )
+
+
+def _unstable(flat: Mapping[str, Any], factors: np.ndarray) -> np.ndarray:
+    """Return at which factors of its bandwidth the loop of a stage is unstable, whatever the friction, (count,)."""
+    states = unstable_among(Ensemble.held(faster(flat, factors), len(factors)))
+    return np.any([*states.values()], axis=0)
 
 
 class _Grid:
