@@ -38,7 +38,7 @@ from friso.hunting.criteria import Verdict
 from friso.questions.check.figures import check_figures, response_figure
 from friso.questions.check.page import check_html, conclusion, verdict_sentence
 from friso.questions.check.table import rows, rows_behind
-from friso.questions.check.words import edge_text
+from friso.questions.check.words import answer, edge_text
 from friso.shown import pages
 from friso.shown.cases import COLOURS, ShownCase, shown_cases
 from friso.shown.drawing import images, matplotlib_renderer, plotly_renderer
@@ -454,6 +454,14 @@ def test_what_a_search_left_open_depends_on_whether_the_edge_is_sure() -> None:
     everywhere = sentence(replace(sure, margin=None, given_up=(CheckPart.LOWER_BANDWIDTHS,)))
     assert "still possible at 10 times" in everywhere
     assert "lower bandwidths" in everywhere
+
+
+def test_what_a_check_leaves_open_for_its_work_goes_with_commands_that_go_on() -> None:
+    """No command is named where nothing was left open."""
+    commands = ["friso boundary", "friso map", "friso simulate"]
+    for given_up in ((), (CheckPart.BANDWIDTHS,), (CheckPart.FRICTION,)):
+        says = " ".join(answer({"given": replace(fake_case(), judgement=settles(given_up=given_up))}))
+        assert [command for command in commands if command in says] == (commands if given_up else [])
 
 
 def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording) -> None:

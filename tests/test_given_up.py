@@ -15,6 +15,7 @@ from variants import VARIANTS
 from friso.engine.allowance import Exhausted, allowance, current_allowance
 from friso.engine.arrays import Status
 from friso.hunting import (
+    MORE_WORK,
     AttractionEnd,
     BandwidthWindow,
     CheckPart,
@@ -28,6 +29,7 @@ from friso.hunting import (
     verdict,
 )
 from friso.hunting.attractors import Attractors
+from friso.hunting.cycle.hunting import GIVEN_UP
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.settings import BasinSettings
@@ -231,3 +233,8 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
     assert (judgement.settled_after, judgement.followed) == (None, None)
     assert (judgement.hunting.certain, judgement.hunting.reason) == (False, UNFOLLOWED)
     assert spent.used < 1e6
+
+
+def test_reasons_of_lacking_work_are_told_by_the_words_that_lead_to_other_commands() -> None:
+    """A check names the commands without a limit of work where a sentence has these words."""
+    assert all(MORE_WORK in reason for reason in (GIVEN_UP, UNFOLLOWED))

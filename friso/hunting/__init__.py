@@ -36,7 +36,7 @@ from friso.hunting.cycle.return_map import ReturnMap
 from friso.hunting.cycle.shooting import Orbits
 from friso.hunting.derivatives import CycleDerivatives, cycle_derivatives, edge_derivatives, flow_derivatives
 from friso.hunting.feeding import Decline, Feeding
-from friso.hunting.limits import SEARCH_LIMITS, SearchLimits
+from friso.hunting.limits import MORE_WORK, SEARCH_LIMITS, SearchLimits
 from friso.hunting.loop import LoopState, LowerGains, unstable
 from friso.hunting.many_stages import (
     StageAttractors,
@@ -64,6 +64,7 @@ __all__ = [
     "DITHERS",
     "END_OF_RANGE",
     "LONG_RUN_RTOL",
+    "MORE_WORK",
     "SEARCH_LIMITS",
     "AttractionEnd",
     "BandwidthWindow",

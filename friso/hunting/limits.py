@@ -27,3 +27,6 @@ class SearchLimits:
 
 
 SEARCH_LIMITS = SearchLimits()
+
+MORE_WORK = "more work than a check may"
+"""Words of every message on what was given up for lack of work; beside them a check names the commands that go on."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
-from friso.hunting import CheckPart
+from friso.hunting import MORE_WORK, CheckPart
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.quantities import percent, plain_factor
 from friso.questions.check.margin_words import margin_ways
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Kick, Tracking
 
 _WINDOWS = 4  # largest number of listed windows of kicks
-UNKNOWN = "not determined: that takes more work than a check may"
+UNKNOWN = f"not determined: that takes {MORE_WORK}"
 
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:

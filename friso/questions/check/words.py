@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
 from friso.equations.scaled_friction import least_static_factor
-from friso.hunting import SEARCH_LIMITS, CheckPart
+from friso.hunting import MORE_WORK, SEARCH_LIMITS, CheckPart
 from friso.hunting.criteria import ATTRACTED
 from friso.quantities import percent, plain_factor
 from friso.questions.check.feeding_words import feeding_sentences
@@ -105,9 +105,23 @@ def _after_loop(case: Case, sentences: str) -> str:
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
-    """Return a sentence for each case: as given, joint locked, joint free; then the conclusion."""
+    """Return a sentence for each case: as given, joint locked, joint free; then the conclusion.
+
+    If something was given up, the last sentence says which commands go on.
+    """
     says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
-    return [*says, *filter(None, [conclusion(cases)])]
+    return [*says, *filter(None, [conclusion(cases)]), *_goes_on(cases, says)]
+
+
+def _goes_on(cases: Mapping[str, Case], says: Sequence[str]) -> list[str]:
+    """Say which commands have no limit of work, if the sentences `says` on the cases leave something open for it."""
+    if not any(MORE_WORK in text for text in says) and not any(case.judgement.given_up for case in cases.values()):
+        return []
+    return [
+        "A check ends after a fixed amount of work. Without that limit, friso boundary follows hunting over a range of "
+        "your choice (--x speed=0.5..2, or another key), friso map runs stages over one, and friso simulate runs one "
+        "motion for longer (--set motion.duration)."
+    ]
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:
@@ -197,7 +211,7 @@ def _following(case: Case) -> str:
 
 def _too_much(what: str) -> str:
     """Say that something, named by `what`, was not determined because it takes too much work."""
-    return f"{what} was not determined, as that takes more work than a check may"
+    return f"{what} was not determined, as that takes {MORE_WORK}"
 
 
 def _kick(name: str, kick: Kick, unit: str) -> str:
@@ -362,7 +376,7 @@ def _unsearched(case: Case) -> list[str]:
     if case.judgement.margin and case.judgement.margin.certain:
         return [f"{_too_much('Whether hunting is possible again at other bandwidths')}."]
     if case.judgement.margin:
-        return ["The search for the edge of hunting was given up there: it takes more work than a check may."]
+        return [f"The search for the edge of hunting was given up there: it takes {MORE_WORK}."]
     return [f"{_too_much('At which bandwidths hunting is possible')}."]
 
 
