@@ -108,6 +108,24 @@ def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
     assert (again.returncode, "nothing was overwritten" in again.stderr) == (2, True)
 
 
+def test_the_stage_file_says_that_its_mass_holds_the_rotor_which_no_parameter_file_states(tmp_path: Path) -> None:
+    """A user gave the mass of the load alone; the rotor of a screw axis may be the larger part."""
+    for unit, joint, force, answers in (
+        ("mm", "TYPE = LINEAR", "20 N", MACHINE),
+        ("deg", "TYPE = ANGULAR", "3 N*m", ROTARY),
+    ):
+        path = ini(tmp_path, GAINS, unit, joint)
+        with pytest.raises(InputError) as refused:
+            stage_from(path, None, {"force_per_output": force})
+        text = stage_from(path, None, {"force_per_output": force, **answers}).text()
+        (asked,) = (line for line in str(refused.value).splitlines() if "masses.stage" in line)
+        (marked,) = (line for line in text.splitlines() if line.startswith("# [masses]"))
+        for line in (asked, marked):
+            assert "rotor" in line
+            assert ("inertia of load" in line) == (unit == "deg")
+        assert "not in the drive's file" in marked
+
+
 def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS)
     assert done.returncode == 2

@@ -92,6 +92,13 @@ class UserAnswers:
         raise InputError(key, quoted(str(self.texts[key])), f"number and unit in quotes, in {units}", example)
 
 
+def moving_mass(kind: AxisKind) -> str:
+    """Say what counts as moving mass of an axis that a drive moves; no parameter file states it."""
+    if kind == LINEAR:
+        return "the mass of load and rotor; a rotor of inertia J counts as J (2 pi / travel of a turn)^2"
+    return "the inertia of load and rotor about the axis; behind a gear the rotor's counts times the ratio squared"
+
+
 def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[OpenQuestion, ...]:
     """List questions about the machine that no parameter file answers and the user has not.
 
@@ -100,7 +107,7 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
     """
     asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
-        asked += _of_table("masses", Masses, ("stage",), {"stage": "what moves"}, kind)
+        asked += _of_table("masses", Masses, ("stage",), {"stage": moving_mass(kind)}, kind)
     model = str(answers.texts.get("friction.model", "lugre"))
     if model not in FRICTION.classes:
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
-from friso.drives.questions import UserAnswers, refuse_open
+from friso.drives.questions import UserAnswers, moving_mass, refuse_open
 from friso.errors import InputError, shortened
 from friso.escapes import one_line
 from friso.platform.paths import flaw_of
@@ -35,8 +35,10 @@ class StageOfAxis:
     left_out: tuple[str, ...]
 
     def text(self) -> str:
-        """Return the stage file, which begins with comments on what was left out."""
+        """Return the stage file, which begins with comments on its mass and on what was left out."""
         sentences = [f"From {self.path.name}, {self.axis}, by friso init --from."]
+        if self.stage.transmission is None:
+            sentences.append(f"[masses] is not in the drive's file: enter {moving_mass(self.stage.axis_kind)}")
         sentences += [f"Left out: {sentence}" for sentence in self.left_out]
         return "\n".join([*(f"# {one_line(sentence)}" for sentence in sentences), self.stage.to_toml()])
 
