@@ -426,6 +426,14 @@ def test_rows_of_other_cycles(wording: Wording) -> None:
         wording(changed_rows(tabled(hunts()), tabled(other)))
 
 
+def test_the_time_constant_is_that_of_a_cycle_that_attracts() -> None:
+    """That of an unstable cycle stood as the time constant of transients, which it does not describe."""
+    repels = fake_hunting(fake_cycle(multiplier=-1.0112))
+    row = "Hunting cycle, time constant"
+    assert (tabled(hunts())[row] or "").endswith(" s")
+    assert row not in tabled(settles(verdict="transient", hunting=repels))
+
+
 def test_windows_of_kicks(wording: Wording) -> None:
     many = tuple((i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8))
     for windows in ((), ((1e-5, 0.1),), ((1e-5, 2e-3), (3e-3, 4e-3)), many):

@@ -71,6 +71,11 @@ def _amplitude(cycle: Cycle) -> str:
     return f"{plus_minus(cycle.amplitude, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
 
 
+def _time_constant(cycle: Cycle) -> str:
+    """Write the time in which deviations from a cycle shrink by the factor e; a dash for one that repels."""
+    return with_unit(cycle.time_constant, "s") if cycle.attracts else NOTHING
+
+
 def _multiplier(cycle: Cycle) -> str:
     """Write the Floquet multiplier of a cycle, and the growth that a simulation shows."""
     simulated = f" (simulated: {cycle.growth:.4f})" if cycle.growth == cycle.growth else ""
@@ -219,7 +224,7 @@ _NUMBERS: dict[str, Callable[[Case], str]] = {
     "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
     "Other hunting cycles": _further_cycles,
     "Observed in simulations": _observed,
-    "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
+    "Hunting cycle, time constant": _of_the_cycle(_time_constant),
     "Edge of hunting": _edge,
     "Hunting, by static friction": _static_friction,
     "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
