@@ -64,7 +64,7 @@ def test_where_hunting_begins_is_told_of_a_stage_that_settles(rig: Stage) -> Non
     assert not attracts(case.stage, margin.above.same)
     assert attracts(case.stage, margin.above.other)
     (sentence,) = friction_sentences(case)
-    assert "Coulomb friction held" in sentence
+    assert "Coulomb friction, which is held at 1.00 N" in sentence
 
 
 def test_static_friction_alone_is_scaled_or_all_of_it() -> None:
@@ -122,7 +122,8 @@ def test_a_margin_is_told_with_both_of_its_ends() -> None:
     assert "between 0.444 and 0.5 times" in margin_sentence("static friction", ends)
     assert "between 1.3 and 1.45 times" in margin_sentence("static friction", ends)
     (sentence,) = friction_sentences(made_up_case(begins, settles()))
-    assert "2.94 to 3.20 N" in sentence  # 3 N times the factors, less 1 N
+    assert "3.93 to 4.20 N" in sentence  # 3 N times the factors that are told
+    assert "2.93 to 3.20 N" in sentence  # less 1 N
     already = ParameterMargin(False, None, MarginEnd(1.0, 1.08, True), (1 / 3, 3.0))
     assert "at 1.08 times yours or less" in margin_sentence("static friction", already)
 

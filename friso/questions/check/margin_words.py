@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 from friso.equations.scaled_friction import static_frictions
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent, plain_factor
-from friso.shown.drawing.prefixes import listed, range_with_unit, rounded_down, rounded_up
+from friso.shown.drawing.prefixes import (
+    digits_that_differ,
+    listed,
+    range_with_unit,
+    rounded_down,
+    rounded_up,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     from friso.hunting import Case, MarginEnd, ParameterMargin
@@ -23,7 +30,7 @@ def friction_sentences(case: Case) -> list[str]:
     if margin is None:
         return []
     lowest = "Coulomb friction" if margin.range[0] > 1 / SEARCH_LIMITS.most_friction else ""
-    return [margin_sentence("static friction", margin, f"{_gap(case, margin)} (Coulomb friction held)", lowest)]
+    return [margin_sentence("static friction", margin, _forces(case, margin) or " (Coulomb friction held)", lowest)]
 
 
 def margin_sentence(name: str, margin: ParameterMargin, remark: str = "", lowest: str = "") -> str:
@@ -87,13 +94,23 @@ def _way(side: int, end: MarginEnd) -> str:
     """
     if end.same == 1:  # how little change is enough is not known
         return f"at {plain_factor(end.other)} times yours or {'less' if side > 0 else 'more'}"
+    low, high = _factors(end)
+    return f"between {plain_factor(low)} and {plain_factor(high)} times yours"
+
+
+def _factors(end: MarginEnd) -> tuple[float, float]:
+    """Return the multiples of a parameter between which hunting begins or ends, rounded as they are told."""
+    if end.same == 1:
+        stated = float(plain_factor(end.other))
+        return stated, stated
     low, high = sorted((end.same, end.other))
-    return f"between {plain_factor(rounded_down(low))} and {plain_factor(rounded_up(high))} times yours"
+    return rounded_down(low), rounded_up(high)
 
 
-def _gap(case: Case, margin: ParameterMargin) -> str:
-    """Write static minus Coulomb friction [N] where hunting begins or ends.
+def _forces(case: Case, margin: ParameterMargin) -> str:
+    """Write static friction, and static minus Coulomb friction [N], where hunting begins or ends.
 
+    The numbers follow from the rounded multiples that stand before them, so that a reader finds one from another.
     The text is empty for a stage with several friction laws, or unless hunting changes on one side only.
     """
     flat = case.stage.flat()
@@ -103,6 +120,9 @@ def _gap(case: Case, margin: ParameterMargin) -> str:
         return ""
     ((static, coulomb),) = pairs.items()
     (end,) = ends
-    low, high = sorted((end.other if end.same == 1 else end.same, end.other))
-    least, most = (flat[static] * factor - flat[coulomb] for factor in (low, high))
-    return f", a gap to Coulomb friction of {range_with_unit(least, most, 'N')}"
+    held = flat[coulomb]
+    least, most = (flat[static] * factor for factor in _factors(end))
+    above = range_with_unit(max(least - held, 0.0), max(most - held, 0.0), "N")
+    digits = digits_that_differ([least, most, held])
+    at = range_with_unit(least, most, "N", digits)
+    return f" ({at}: {above} above Coulomb friction, which is held at {with_unit(held, 'N', digits)})"
