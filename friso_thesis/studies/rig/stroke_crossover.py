@@ -122,7 +122,7 @@ def limits_of_crossover(
 
     For each stroke, crossovers are tried from the highest down, to the first at which some rail has counted peaks; the
     lowest is always tried. No more rails are run on a cell once one has peaks. Runs left out have the outcome "failed".
-    The arguments are those of `stroke_crossover`, for a stage with a [rail].
+    `strokes` and `factors` are relative to the stage's stroke and crossover [-], and `seeds` those of its [rail].
     """
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     shape = len(sizes), len(frequencies), len(seeds)
