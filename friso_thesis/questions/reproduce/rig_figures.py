@@ -242,7 +242,8 @@ def _grid(experiments: Experiments) -> dict[str, Figure]:
         "peaks. Crossovers are tried from the highest down to the limit, and at the lowest. The thesis shows counts "
         "of one rail."
     )
-    return {"26": Figure("figure-26", "Figure 26: stroke and crossover on the rig", caption, (panel,))}
+    note = "White cells were not tried: what they show cannot move the limit."
+    return {"26": Figure("figure-26", "Figure 26: stroke and crossover on the rig", caption, (panel,), note=note)}
 
 
 def _cycles(experiments: Experiments) -> dict[str, Figure]:
