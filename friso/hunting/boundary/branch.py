@@ -182,7 +182,7 @@ class Tracer:
         stages = self.family(np.zeros(len(places), np.int64), places)
         cycles = described(stages, orbits, self.rtol)
         usable = orbits.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
-        certain = np.isfinite(jacobians).all(axis=(1, 2))
+        certain = np.all(np.isfinite(jacobians), axis=(1, 2))
         points: list[Point | None] = [None] * len(places)
         for k in np.flatnonzero(usable):
             one = np.array([k])

@@ -140,7 +140,7 @@ def limits_of_crossover(
         for entry in fields(runs):
             getattr(runs, entry.name)[chosen] = getattr(several, entry.name)
         tried.flat[chosen] = True
-        counted = runs.counted.reshape(shape).any(axis=2)
+        counted = np.any(runs.counted.reshape(shape), axis=2)
         free = {cell for cell in cells if tried[cell].all() and not counted[cell]}
         below = {(row, column - 1) for row, column in free if column}
         cells = {cell for cell in cells - free | below if not counted[cell] and not tried[cell].all()}
