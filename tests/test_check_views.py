@@ -567,6 +567,22 @@ def test_where_the_loop_is_unstable_friction_is_not_said_to_make_the_stage_hunt(
     assert sentence(settles(), unstable_bandwidths=(below,)).count("5.60 Hz") == 1  # not as the edge of hunting, too
 
 
+def test_no_bandwidth_is_advised_at_which_the_loop_is_unstable() -> None:
+    """The edge of hunting lies at 9.75 Hz: with an unstable loop from 10.4 Hz on no distance is kept from it, and with
+    one from 9.6 Hz on no bandwidth above it is advised."""
+    soon, at_once = (BandwidthWindow(AttractionEnd(low, 0.999 * low, True), None) for low in (1.3, 1.2))
+    says = sentence(hunts(), unstable_bandwidths=(soon,))
+    assert "to 9.80 Hz" in says
+    assert "loop becomes unstable" in says
+    assert "hunting begins again" not in says
+    assert "to 9.80 Hz" not in sentence(hunts(), unstable_bandwidths=(at_once,))
+    assert "to 11.8 Hz" in sentence(hunts())
+    lower = AttractionEnd(0.5047, 0.5, True)
+    below = BandwidthWindow(None, AttractionEnd(0.502, 0.5025, True))
+    assert "4.00 Hz" in sentence(hunts(lower=lower))
+    assert "4.00 Hz" not in sentence(hunts(lower=lower), unstable_bandwidths=(below,))
+
+
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
 @example(1.00499 / 8, 5.085e-3)
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
@@ -361,7 +362,7 @@ def _outlook(case: Case) -> list[str]:
     """Say at which other bandwidths the stage hunts, or that none was found."""
     judgement = case.judgement
     says: list[str] = []
-    if judgement.margin and not any(window.holds(judgement.margin.factor) for window in case.unstable_bandwidths):
+    if judgement.margin and not _holds(case.unstable_bandwidths, judgement.margin.factor):
         up_to = "below" if judgement.margin.certain else "up to"
         says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
     elif not judgement.margin and judgement.hunting.possible and CheckPart.BANDWIDTHS not in judgement.given_up:
@@ -480,8 +481,9 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """Say what keeps a stage from hunting: a faster or slower controller, or a free joint."""
     judgement = item.case.judgement
     grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
-    ways = [_faster(item.case, judgement.margin)] if judgement.margin and not grows else []
-    ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
+    edge, lower, lost = judgement.margin, judgement.lower, item.case.unstable_bandwidths
+    ways = [_faster(item.case, edge)] if edge and not grows and not _holds(lost, edge.quiet) else []
+    ways += [_slower(item.case, lower)] if lower and not _holds(lost, lower.outside) else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
     if judgement.margin or CheckPart.BANDWIDTHS in judgement.given_up:
@@ -489,13 +491,17 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     if judgement.hunting.target is None:
         return says
     given_up = CheckPart.LOWER_BANDWIDTHS in judgement.given_up
-    lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
+    open_below = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if given_up else []
     still = "is still possible" if judgement.hunting.certain else "was still found"
     tune = "" if ways else " friso tune looks for other settings."
-    highest = f"at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth"
-    lost = any(window.high is None for window in item.case.unstable_bandwidths)
-    to_the_top = f"{still} up to where the loop itself is unstable" if lost else f"{still} {highest}"
-    return [f"Hunting {to_the_top}.{tune}", *says, *lower]
+    highest = f"{still} at {SEARCH_LIMITS.highest_bandwidth:g} times this bandwidth"
+    to_the_top = f"{still} up to where the loop itself is unstable" if _holds(lost, math.inf) else highest
+    return [f"Hunting {to_the_top}.{tune}", *says, *open_below]
+
+
+def _holds(windows: Iterable[BandwidthWindow], factor: float) -> bool:
+    """Tell whether one of some windows of bandwidths holds a factor on the stage's bandwidth."""
+    return any(window.holds(factor) for window in windows)
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
@@ -514,10 +520,12 @@ def _faster(case: Case, edge: Margin) -> str:
     """
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
     apart = _distance(case, edge)
+    near = {"the loop becomes unstable": case.unstable_bandwidths, "hunting begins again": case.judgement.windows}
+    why = next((f": {comes} closely" for comes, windows in near.items() if _again(edge, windows)), "")
     kept = (
         f", at least {apart:g} times the edge of hunting{_with_other_friction(case)}"
         if apart > 1
-        else ", just above the edge: hunting begins again closely"
+        else f", just above the edge{why}"
     )
     doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
     if edge.crossover is not None:
@@ -548,25 +556,27 @@ def _with_other_friction(case: Case) -> str:
 def _distance(case: Case, edge: Margin) -> float:
     """Return the factor by which the bandwidth advised lies above the edge of hunting.
 
-    Usually it is the distance that advice keeps. It is 1 if the stage hunts again within that distance, over a range
-    wide or close enough to matter. It is also 1 if the distance leads beyond the bandwidths searched.
+    Usually it is the distance that advice keeps. It is 1 if within that distance the stage hunts again, or its loop is
+    unstable, over a range wide or close enough to matter. It is also 1 if the distance leads beyond the bandwidths
+    searched.
     """
     distance = SEARCH_LIMITS.edge_distance
-    to = edge.quiet * distance
+    again = _again(edge, (*case.judgement.windows, *case.unstable_bandwidths))
+    return 1.0 if again or edge.quiet * distance > SEARCH_LIMITS.highest_bandwidth else distance
 
-    def in_the_way(window: BandwidthWindow) -> bool:
-        """Tell whether the stage hunts again between the edge and the bandwidth advised.
 
-        `window` is a range of bandwidths in which it hunts. A narrow range well below the bandwidth advised does not
-        count.
-        """
-        low, high = window.low, window.high
-        if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
-            return False
-        return high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2)
+def _again(edge: Margin, windows: Iterable[BandwidthWindow]) -> bool:
+    """Tell whether a window of bandwidths lies between the edge of hunting and the bandwidth advised.
 
-    again = any(in_the_way(window) for window in case.judgement.windows)
-    return 1.0 if again or to > SEARCH_LIMITS.highest_bandwidth else distance
+    A narrow window well below the bandwidth advised does not count.
+    """
+    to = edge.quiet * SEARCH_LIMITS.edge_distance
+    return any(
+        edge.factor < low.inside <= to * (1 + ROUGH)
+        and (high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2))
+        for low, high in ((window.low, window.high) for window in windows)
+        if low is not None
+    )
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
