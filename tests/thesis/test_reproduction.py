@@ -54,7 +54,7 @@ from friso_thesis.studies.thesis import (
 )
 from friso_thesis.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso_thesis.studies.thesis.claims import _JUDGES, BESIDE, beside, judges, registered
-from friso_thesis.studies.thesis.cycles import Edge, Surveyed, _beside_a_change, map_cycles, survey
+from friso_thesis.studies.thesis.cycles import Edge, Surveyed, map_cycles, survey
 from friso_thesis.studies.thesis.evidence import RESPONSES
 from friso_thesis.studies.thesis.experiments import (
     _RUNS,
@@ -923,18 +923,6 @@ def test_outcomes_of_runs_are_kept(tmp_path: Path) -> None:
     kept, runs = Kept(tmp_path), rail_runs([3, 0])
     kept.result(("runs",), RailRuns, lambda: replace(runs, outcome=runs.outcome.astype(object)))
     assert_same(kept.result(("runs",), RailRuns, lambda: pytest.fail("they were kept")), runs)
-
-
-def test_cells_beside_another_answer_are_searched() -> None:
-    """A cell that is not valid is no neighbour; one that is undecided is searched, and so are those beside it."""
-    attracts = np.array([[True, True, True, False, False]])
-    every = np.ones((1, 5), bool)
-    assert _beside_a_change(attracts, every, every).tolist() == [[False, False, True, True, False]]
-    apart = np.array([[True, True, False, True, True]])
-    assert not _beside_a_change(attracts, every, apart)[apart].any()
-    assert _beside_a_change(~every, np.array([[False, True, True, True, True]]), every).tolist() == [
-        [True, True, False, False, False]
-    ]
 
 
 def assert_same(again: Any, made: Any) -> None:

@@ -5,7 +5,7 @@ The module also follows the curves on which cycles stop attracting.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, cast
@@ -16,10 +16,7 @@ from friso.hunting import (
     Bifurcation,
     KeyRange,
     Space,
-    StageAttractors,
     edge_curves,
-    find_attractors,
-    sketch_attractors,
 )
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
@@ -154,38 +151,13 @@ def every(values: int) -> int:
 
 
 def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
-    """Survey all cells of a map: a sketch first, then a search where the sketch may be wrong.
-
-    That is where it is undecided, beside a cell with another answer, or where counted peaks tell otherwise.
-    """
-    study, valid = study_of(coarse), coarse["outcome"].values != "invalid"
-    counted = by_peak_count(coarse)["keeps_moving"].values
-    attracts, decided = np.zeros((2, *valid.shape), bool)
-    parts = list(by_words(study.stage, study.links, study.columns(np.arange(study.cells))))
-
-    def answer(find: Callable[..., StageAttractors], chosen: np.ndarray) -> None:
-        for _, cells, attracted in cell_attractors(parts, chosen.ravel(), find):
-            attracts.flat[cells], decided.flat[cells] = attracted.attracts, attracted.certain
-
-    answer(sketch_attractors, valid)
-    searched = ~valid
-    while (doubted := ~searched & (_beside_a_change(attracts, decided, valid) | (attracts != counted))).any():
-        answer(find_attractors, doubted)
-        searched |= doubted
-    return {"attracts": attracts.ravel(), "decided": (decided & valid).ravel()}
-
-
-def _beside_a_change(attracts: np.ndarray, decided: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """Return which cells are undecided, or have a neighbour with another answer.
-
-    All are booleans in the shape of the map; neighbours that are not `valid` do not count.
-    """
-    from scipy.ndimage import generate_binary_structure, maximum_filter, minimum_filter  # 0.1 s to import
-
-    answers, neighbours = np.where(decided, attracts, 2), generate_binary_structure(valid.ndim, 1)
-    highest = maximum_filter(np.where(valid, answers, -1), footprint=neighbours, mode="nearest")
-    lowest = minimum_filter(np.where(valid, answers, 3), footprint=neighbours, mode="nearest")
-    return (answers == 2) | (highest != lowest)
+    study = study_of(coarse)
+    valid = (coarse["outcome"].values != "invalid").ravel()
+    attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
+    parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
+    for _, cells, attracted in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = attracted.attracts, attracted.certain
+    return {"attracts": attracts, "decided": decided & valid}
 
 
 def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
