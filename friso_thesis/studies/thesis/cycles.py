@@ -12,12 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from friso.hunting import (
-    Bifurcation,
-    KeyRange,
-    Space,
-    edge_curves,
-)
+from friso.hunting import Bifurcation, KeyRange, Space, edge_curves
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
 from friso_thesis.studies.thesis.kept import NOT_KEPT, Kept
@@ -28,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SURVEYED = 14
-"""Approximate number of values per axis at which stages are surveyed. A survey takes some tens of runs a cell."""
+"""Approximate number of values per axis at which stages are surveyed. Each survey takes a hundred runs."""
 
 NODES = 9
 """Number of stages along either axis from which curves are searched for."""
