@@ -33,7 +33,7 @@ from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.effects import explained_by
 from friso.identification.output_error.fit import OutputErrorFit, first_values, polished
 from friso.identification.output_error.parameters import BRISTLES, FitParameter, fit_parameters
-from friso.identification.output_error.problem import Problem, Simulated, tracking
+from friso.identification.output_error.problem import Problem, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -729,17 +729,18 @@ class Valley:
     def _off(self, inner: np.ndarray) -> np.ndarray:
         return self.weight * np.stack([10 * (inner[:, 1] - inner[:, 0] ** 2), 1 - inner[:, 0]], axis=1)
 
-    def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
-        off = self._off(inner)
-        yield np.arange(len(inner)), Simulated(off, off, off)
+    def residuals(self, inner: np.ndarray) -> np.ndarray:
+        return self._off(inner)
 
-    def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    def jacobians(self, inner: np.ndarray, free: np.ndarray, rests: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        assert np.array_equal(rests, self._off(inner))
         self.asked.append(len(inner))
         slopes = [self.weight * np.array([[-20 * a, 10.0], [-1.0, 0.0]]) for a, _ in inner]
-        return list(zip(self._off(inner), slopes, strict=True))
+        return list(zip(rests, slopes, strict=True))
 
 
-def test_a_refined_fit_finds_its_way_along_a_valley_and_asks_for_no_derivative_twice() -> None:
+def test_a_refined_fit_finds_its_way_along_a_valley_with_few_derivatives() -> None:
+    """Derivatives are updated from step to step: two of three iterations need none."""
     pieces = [Valley(1.0), Valley(2.0)]
     starts = np.array([[-1.2, 1.0], [1.0, 1.0], [2.0, -2.0]])
     iterations = 25
@@ -748,6 +749,16 @@ def test_a_refined_fit_finds_its_way_along_a_valley_and_asks_for_no_derivative_t
     assert pieces[0].asked == pieces[1].asked
     assert pieces[0].asked[0] == len(starts)
     assert sum(pieces[0].asked) < 2 * iterations
+
+
+def test_a_refined_fit_goes_on_from_derivatives_that_are_only_near() -> None:
+    """Derivatives of the start's surroundings lead down, and the fit ends with its own."""
+    pieces, starts = [Valley(1.0)], np.array([[1.1, 1.3], [0.8, 0.7]])
+    near = np.array([[-20 * 1.2, 10.0], [-1.0, 0.0]])
+    every = np.ones(starts.shape, bool)
+    refined = refine_fit(cast("list[Problem]", pieces), starts, every, 25, 1e-9, slopes=near)
+    assert refined.inner == pytest.approx(np.ones(starts.shape), abs=1e-3)
+    assert sum(pieces[0].asked) > 0
 
 
 class Sudden(Problem):

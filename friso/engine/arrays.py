@@ -34,7 +34,8 @@ class Batch(NamedTuple):
     - `modes` (n, kinks): initial modes, one for each kink of the equations.
     - `first_steps` and `longest` steps [s] (n,).
     - `segments` (n, pieces + 1, 1 + inputs): pieces of the reference; the last one only marks the end of the run.
-    - `windows` (n,): index of the piece at which the window for extremes opens.
+    - `windows` (n,): index of the piece at which the window for extremes opens; negative if neither extremes nor
+      turning points are wanted.
     - `clocks` (n, 2): sample time of the drive, and delay from a sample to its effect [s].
     - `least_swings` (n,): smallest swing [m] between two turning points for them to be recorded.
     - `tables`: lookup tables of the drive.

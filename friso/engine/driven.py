@@ -76,9 +76,7 @@ def run_driven(
     shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
     """
     count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
-    options = RunOptions(
-        rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count
-    )
+    options = RunOptions(rtol=rtol, bands=(0.0, 0.0), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = options_of(replace(options, interval=inputs.sample_time))
     at_once = int(np.clip(CHUNK / count, FEWEST, MOST))

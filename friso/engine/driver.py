@@ -341,7 +341,8 @@ def load_run(B, layout, lane, j, batch, settings):
     B[ROW.trial * layout.lanes + lane] = batch.first_steps[j]
     B[ROW.longest * layout.lanes + lane] = batch.longest[j]
     end = batch.segments[reference_of(batch, j), batch.segments.shape[1] - 1, 0]
-    B[ROW.record_from * layout.lanes + lane] = min(settings.record_from, 0.5 * end)
+    asked = batch.windows[j] >= 0
+    B[ROW.record_from * layout.lanes + lane] = min(settings.record_from, 0.5 * end) if asked else np.inf
     enter_segment(B, layout, lane, j, 0, batch)
 
 
@@ -400,7 +401,8 @@ def answer(B, layout, lane, batch, settings, results):
         return
     at_stop = B[ROW.time * layout.lanes + lane] >= B[ROW.stop * layout.lanes + lane]
     if not layout.clocked:
-        look_inside(B, layout, lane, fraction, batch, settings, results)
+        if B[ROW.event * layout.lanes + lane] >= 2.0:
+            look_inside(B, layout, lane, fraction, batch, settings, results)
         if at_stop or moment(B, layout, lane, fraction) >= B[ROW.next_sample * layout.lanes + lane]:
             note_samples(B, layout, lane, fraction, settings.interval, results.samples[j])
     if at_stop:
@@ -453,7 +455,7 @@ def outcome(B, layout, lane, batch, settings):
         return DONE
     if B[ROW.attempted * layout.lanes + lane] >= settings.budget:
         return BUDGET
-    if B[ROW.event * layout.lanes + lane] == 2.0:
+    if B[ROW.event * layout.lanes + lane] == 3.0:
         return DIVERGED
     if B[ROW.fraction * layout.lanes + lane] == 0.0:
         return UNDERFLOW

@@ -39,8 +39,9 @@ SCALARS = (
 )
 """Names of rows of one number per lane. time, old_time, stop: present time, time before the step and next corner, all
 since the last corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and
-last step; fraction: its accepted part; event: the lane needs attention; turns: number of stored turning points;
-last_kind: kind of the last one, 1 for a maximum, -1 for a minimum."""
+last step; fraction: its accepted part; event: 1 if the lane needs attention, 2 if a turning point or the entry into a
+band is inside the step, 3 if the run diverged, otherwise 0; turns: number of stored turning points; last_kind: kind of
+the last one, 1 for a maximum, -1 for a minimum."""
 
 DRIVER = ("run", "segment", "inner_before", "outer_before")
 """Names of rows that only the driver uses: the number of the lane's run, negative for none, and of its piece of the

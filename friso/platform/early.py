@@ -1,6 +1,7 @@
 """Prepare the command line before the rest of friso is imported.
 
 A signal during the import is remembered. No module is loaded from the current folder, which may belong to someone else.
+NumPy computes in one thread.
 The module has no effect if friso is used as a library.
 """
 
@@ -52,6 +53,8 @@ def _ignore() -> None:
 
 
 if IS_COMMAND:
+    # read when NumPy is loaded; its threads would wait busily beside those of the engine
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, _note)

@@ -102,9 +102,12 @@ class OutputErrorFit:
         """
         usable = np.isfinite(self.deviation) & (self.deviation > 0)
         wider = np.divide(wanted, self.deviation, out=np.ones(len(self.free)), where=usable)
-        fit = replace(self, covariance=self.covariance * np.outer(wider, wider))
-        if "linearised" in vars(self):  # the derivatives do not depend on the covariance
-            vars(fit)["linearised"] = self.linearised
+        return self.with_covariance(self.covariance * np.outer(wider, wider))
+
+    def with_covariance(self, covariance: np.ndarray) -> OutputErrorFit:
+        """Return the fit with another covariance, (free, free), on which its derivatives do not depend."""
+        fit = replace(self, covariance=covariance)
+        vars(fit).update({name: value for name, value in vars(self).items() if name == "linearised"})
         return fit
 
     @cached_property
@@ -112,6 +115,13 @@ class OutputErrorFit:
         """Return the residual, (n,), and its derivatives by the fitted numbers, (n, free)."""
         mask = np.isin(np.arange(len(self.inner)), self.free)
         return self.problem.linearised(self.inner, mask)
+
+    @property
+    def slopes(self) -> np.ndarray:
+        """Return the derivatives of the residual by all numbers, (n, parameters); 0 for those not fitted."""
+        slopes = np.zeros((len(self.problem.target), len(self.inner)))
+        slopes[:, list(self.free)] = self.linearised[1]
+        return slopes
 
     def value(self, name: str) -> float:
         """Return the value of a parameter in SI units."""
@@ -254,21 +264,36 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
     return [slice(int(first), int(first) + most // settings.stretches_of_a_screening) for first in firsts]
 
 
-def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, progress: Progress = silent) -> OutputErrorFit:
+def polished(
+    problem: Problem,
+    free: tuple[int, ...],
+    inner: np.ndarray,
+    progress: Progress = silent,
+    slopes: np.ndarray | None = None,
+) -> OutputErrorFit:
     """Finish a fit, and determine the uncertainty of its numbers.
 
-    `inner` are the numbers so far, of which those with the indices `free` are fitted. Standard deviations allow for
-    correlated errors, and for the other inputs that the log allows (`problem.unsettled`).
+    `inner` are the numbers so far, of which those with the indices `free` are fitted. `slopes`, shape (n, parameters),
+    are derivatives of the residual near them, if they are known. Standard deviations allow for correlated errors, and
+    for the other inputs that the log allows (`problem.unsettled`).
     """
     settings = OutputErrorSettings.current()
     mask = np.isin(np.arange(len(inner)), free)
     best = refine_fit(
-        [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress
-    ).inner[0]
-    rest, slopes = problem.linearised(best, mask)
-    covariance = spread_along(problem, slopes, rest)
-    moved = [_moved_by(inputs, problem, best, slopes, rest) for inputs in problem.unsettled]
-    return OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
+        [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress,
+        slopes=slopes,
+    ).inner[0]  # fmt: skip
+    rest, own = problem.linearised(best, mask)
+    covariance = spread_along(problem, own, rest)
+    moved = [_moved_by(inputs, problem, best, own, rest) for inputs in problem.unsettled]
+    fit = OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
+    vars(fit)["linearised"] = (rest, own)
+    return fit
+
+
+def polished_again(fit: OutputErrorFit, problem: Problem) -> OutputErrorFit:
+    """Finish a fit of a slightly different problem, from the numbers and the derivatives of `fit`."""
+    return polished(problem, fit.free, fit.inner, slopes=fit.slopes)
 
 
 def spread_along(problem: Problem, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:

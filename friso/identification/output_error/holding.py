@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from scipy.stats import chi2
 
-from friso.identification.output_error.fit import OutputErrorFit, polished
+from friso.identification.output_error.fit import OutputErrorFit, polished_again
 from friso.identification.output_error.settings import OutputErrorSettings
 
 
@@ -20,7 +20,7 @@ def with_smoothness_settled(fit: OutputErrorFit) -> OutputErrorFit:
     as 1.47 and the bristles a fifth too soft. Too little smoothing passes the noise of the position on to the force.
     """
     while fit.problem.sharper:
-        sharper = polished(fit.problem.held_to(0), fit.free, fit.inner)
+        sharper = polished_again(fit, fit.problem.held_to(0))
         if sharper.cost >= fit.cost:
             break
         fit = sharper
@@ -41,10 +41,10 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
         return fit
     sharper = tuple(inputs for inputs in problem.unsettled if inputs is not other)
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
-    swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
+    swapped = polished_again(fit, replace(problem, inputs=other, unsettled=(problem.inputs, *turned)))
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
     if better.left > settings.noise_ratio_of_a_closed_fit * problem.noise_left(noise) or worse.cost < better.cost * (
         1 + chi2.ppf(settings.probability_of_an_effect, 1) / better.independent
     ):
         return better
-    return polished(replace(better.problem, unsettled=turned if better is swapped else sharper), fit.free, better.inner)
+    return polished_again(better, replace(better.problem, unsettled=turned if better is swapped else sharper))

@@ -86,6 +86,7 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
         settings.iterations_of_a_profile,
         settings.cost_share_of_a_profile * WORSE / fit.independent,
         aim=limit,
+        slopes=fit.slopes,
     )
     inner[away], cost[away] = refined.inner, refined.cost
     return Refined(inner, cost)

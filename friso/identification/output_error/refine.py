@@ -48,65 +48,99 @@ def refine_fit(
     enough: float,
     progress: Progress = silent,
     aim: float = np.inf,
+    slopes: np.ndarray | None = None,
 ) -> Refined:
     """Fit all `pieces` of a problem from several starts at once (Levenberg, Marquardt).
 
     The starts have the shape (starts, parameters); `free`, of equal shape, marks the numbers to fit. A fit ends when
     its sum of squares falls by less than the fraction `enough`.
 
-    For every start several dampings are tried side by side, which costs less than derivatives; these are recomputed
-    only if one damping was better. A number at an end of its range stays there while it is driven outwards. A fit that
-    would not fall to the mean square `aim` at the pace of its last iteration is abandoned.
+    For every start several dampings are tried side by side, which costs less than derivatives. After a step the
+    derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6); they
+    are computed anew if the residual falls by much less than they predict. `slopes`, shape (samples, parameters), are
+    derivatives near the starts, if they are known. A number at an end of its range stays there while it is driven
+    outwards. A fit that would not fall to the mean square `aim` at the pace of its last iteration is abandoned.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
     margin = settings.range_share_inside * (high - low)
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
-    cost = costs(pieces, inner)
+    rest = _residuals(pieces, inner)
+    cost = _mean_square(rest)
     damping = np.full(len(inner), settings.first_damping)
     busy = np.isfinite(cost)
-    squares, gradients = np.zeros((*inner.shape, inner.shape[1])), np.zeros(inner.shape)
-    moved = busy.copy()
+    exact, asked = np.zeros(len(inner), bool), busy & (slopes is None)
+    slopes = np.zeros((*rest.shape, inner.shape[1])) if slopes is None else slopes * free[:, None, :]
     for iteration in range(iterations):
         progress(iteration, iterations, "")
-        squares[moved], gradients[moved] = _curvature(pieces, inner[moved], free[moved])
-        busy &= np.isfinite(gradients).all(axis=1) & (damping < settings.highest_damping)
+        anew = np.flatnonzero(busy & asked)
+        slopes[anew], exact[anew] = _derivatives(pieces, inner[anew], free[anew], rest[anew]), True
+        busy &= np.isfinite(slopes).all(axis=(1, 2)) & (damping < settings.highest_damping)
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
         dampings = damping[rows, None] * LADDER
-        downhill = -gradients[rows]
+        across = np.swapaxes(slopes[rows], 1, 2)
+        squares, downhill = across @ slopes[rows], -(across @ rest[rows, :, None])[:, :, 0]
         inside = ((inner[rows] > low) | (downhill > 0)) & ((inner[rows] < high) | (downhill < 0))
-        steps = _steps(squares[rows] * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
+        steps = _steps(squares * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
         trials = np.clip(inner[rows, None] + steps, low, high)
-        squared = costs(pieces, trials.reshape(-1, inner.shape[1])).reshape(dampings.shape)
+        rests = _residuals(pieces, trials.reshape(-1, inner.shape[1])).reshape(*dampings.shape, -1)
+        squared = _mean_square(rests)
         best = np.arange(len(rows)), squared.argmin(axis=1)
-        better = squared[best] < cost[rows]
-        done = better & (squared[best] > cost[rows] * (1 - enough))
-        damping[rows] = np.where(better, dampings[best], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0])
-        late = np.minimum(squared[best], cost[rows])
-        late -= (iterations - 1 - iteration) * (cost[rows] - late)
-        inner[rows[better]], cost[rows[better]] = trials[best][better], squared[best][better]
-        left = late > aim
-        busy[rows[done | left]] = False
-        moved[:] = False
-        moved[rows[better & ~done & ~left]] = True
+        fallen = cost[rows] - squared[best]
+        better, slow = fallen > 0, fallen < enough * cost[rows]
+        late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
+        linear = (slopes[rows] @ (trials[best] - inner[rows])[:, :, None])[:, :, 0]
+        predicted = cost[rows] - _mean_square(rest[rows] + linear)
+        poor = fallen < settings.share_of_predicted_fall * predicted
+        raised = np.where(exact[rows], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0], damping[rows])
+        damping[rows] = np.where(better, dampings[best], raised)
+        busy[rows] = ~(exact[rows] & (late | (better & slow)))
+        asked[rows] = np.where(better, poor | slow | late, ~exact[rows])
+        exact[rows[better]] = False
+        rows, best = rows[better], (best[0][better], best[1][better])
+        missed = rests[best] - rest[rows] - linear[better]
+        slopes[rows] += _update(trials[best] - inner[rows], missed, squares[better])
+        inner[rows], cost[rows], rest[rows] = trials[best], squared[best], rests[best]
     return Refined(inner, cost)
 
 
-def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return J' J and J' r for each row of fitted numbers, from Jacobian J and residual r.
+def _update(step: np.ndarray, missed: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Return the change of derivatives after steps (rows, parameters), shape (rows, samples, parameters).
 
-    Entries are 0 for numbers that are not `free`.
+    `missed` (rows, samples) is the change of the residual that the derivatives did not predict. `squares` (rows,
+    parameters, parameters) are products of derivatives, whose diagonal scales the parameters.
     """
-    count = inner.shape[1]
-    squares, gradients = np.zeros((len(inner), count, count)), np.zeros((len(inner), count))
+    weighted = np.diagonal(squares, axis1=1, axis2=2) * step
+    length = np.sum(weighted * step, axis=1, keepdims=True)
+    along = np.divide(weighted, length, out=np.zeros_like(step), where=length > 0)
+    return missed[:, :, None] * along[:, None, :]
+
+
+def _residuals(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
+    """Return the residuals [N] of all pieces for fitted numbers (runs, parameters), shape (runs, samples)."""
+    return np.concatenate([problem.residuals(inner) for problem in pieces], axis=1)
+
+
+def _mean_square(residuals: np.ndarray) -> np.ndarray:
+    """Return the mean squares of residuals over their last axis; infinite if one is not finite."""
+    return np.mean(residuals**2, axis=-1)
+
+
+def _derivatives(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray, rests: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the residuals by fitted numbers, shape (rows, samples, parameters).
+
+    They are 0 for numbers that are not `free`. `rests` are the residuals [N], (rows, samples).
+    """
+    slopes = np.zeros((len(inner), sum(len(problem.target) for problem in pieces), inner.shape[1]))
+    first = 0
     for problem in pieces if len(inner) else ():
-        for row, (residual, jacobian) in enumerate(problem.jacobians(inner, free)):
-            squares[row][np.ix_(free[row], free[row])] += jacobian.T @ jacobian
-            gradients[row, free[row]] += jacobian.T @ residual
-    return squares, gradients
+        part = slice(first, first := first + len(problem.target))
+        for row, (_, jacobian) in enumerate(problem.jacobians(inner, free, rests[:, part])):
+            slopes[row][part, free[row]] = jacobian
+    return slopes
 
 
 def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> np.ndarray:

@@ -41,6 +41,7 @@ def as_far_off_as_repeated(
             free[None],
             settings.iterations_of_a_repetition,
             settings.cost_share_of_refinement,
+            slopes=once.slopes,
         )
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
@@ -63,7 +64,7 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     covariance = fit.covariance.copy()
     place = fit.fitted.index("friction.bristle_damping")
     covariance[place, place] += (late / fit.value("friction.bristle_damping") / COVERAGE) ** 2
-    return replace(fit, covariance=covariance)
+    return fit.with_covariance(covariance)
 
 
 def _simulated_logs(

@@ -149,6 +149,9 @@ class OutputErrorSettings(Settings):
     cost_share_of_refinement: float = setting(1e-4, "")
     """Relative decrease of the sum of squares per iteration at which a fit ends by default."""
 
+    share_of_predicted_fall: float = setting(0.5, "")
+    """Fall of the sum of squares, relative to its prediction, below which derivatives are computed anew."""
+
     range_share_inside: float = setting(1e-9, "")
     """Smallest distance of a fitted number from the ends of its range, relative to the range."""
 
@@ -156,7 +159,7 @@ class OutputErrorSettings(Settings):
     repetitions_of_a_fit: int = setting(4, "")
     """Number of simulated logs on which a fit is repeated. With 4, Student's t is 1.4 times the normal quantile."""
 
-    iterations_of_a_repetition: int = setting(8, "")
+    iterations_of_a_repetition: int = setting(15, "")
     """Number of iterations of a repeated fit, which starts from the true values."""
 
     seed_of_repetitions: int = setting(11, "")
