@@ -19,7 +19,7 @@ import friso
 from benchmarks.tune import performance_of
 from friso import Stage, load, loads
 from friso.app import questions
-from friso.cli.asking import show
+from friso.cli.asking import Shown, show
 from friso.design_method.isolator import isolated
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS, Results
@@ -37,6 +37,7 @@ from friso.frequency.family import controller_response
 from friso.hunting import Ensemble, check_given, find_cycles, find_margin
 from friso.hunting.criteria import settling_of_runs
 from friso.hunting.measures import measured_run
+from friso.progress import Progress
 from friso.questions.check.isolator_words import isolator_sentence
 from friso.questions.tune.document import tune_document
 from friso.questions.tune.figures import _sensitivity, drawn_stages, tune_figures
@@ -675,12 +676,22 @@ def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Sta
     assert pairs([closest, isolator], goal)
 
 
-def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
+def test_ctrl_c_leaves_the_best_so_far(
+    tuning: Advice, wording: Wording, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert tuning.interrupted
     assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
-    wording(answer(tuning)[0])
+    first = answer(tuning)[0]
+    wording(first)
+    before: list[str] = []
+
+    def write(progress: Progress) -> list[Path]:
+        before.append(capsys.readouterr().out)
+        return []
+
     with pytest.raises(KeyboardInterrupt):  # status 130, whatever was found
-        show(TuneAnswer(tuning), ())
+        show(TuneAnswer(tuning), Shown(), write)
+    assert " ".join(before[0].split()).startswith(" ".join(first.split()))
 
 
 def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(

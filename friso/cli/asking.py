@@ -22,6 +22,7 @@ from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.platform.interrupts import answers_interrupts
 from friso.platform.system import cause_of, path_of
+from friso.progress import Progress
 
 if TYPE_CHECKING:
     from friso.interface.answer import Answer
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
 
 DRAWING = "drawing the page"
 """Label of the progress bar once an answer is there."""
+
+
+Write = Callable[[Progress], list[Path]]
+"""Function that draws and writes the files of an answer, and returns their paths."""
 
 
 @dataclass(frozen=True)
@@ -60,18 +65,14 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         target = OutputFolder(question.name, shown.out, shown.overwrite, [*_paths([*about, *options.values()])])
         target.check(question.files)
         beside = drawing_beside()
-    files, unwritten = [], ""
-    with ProgressBar(question.during) as progress, beside:
-        with named_as_options(question.options):
+    with beside:
+        with ProgressBar(question.during) as progress, named_as_options(question.options):
             answer = question.function(*about, **options, **kept, progress=progress)
         speak_of(answer.axis_kind)
-        if target is not None:
-            progress(0, 0, DRAWING)
-            files, unwritten = tried(lambda: target.write(answer.files(), progress))
-    show(answer, files, shown.as_json, shown.details, unwritten)
+        show(answer, shown, None if target is None else lambda progress: target.write(answer.files(), progress))
 
 
-def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
+def tried(write: Callable[[], list[Path]], nothing: str) -> tuple[list[Path], str]:
     """Write files and return them, or return none and the reason why writing failed.
 
     The answer is shown even if writing fails; `nothing` says what is then missing.
@@ -84,20 +85,23 @@ def tried(write: Callable[[], list[Path]], nothing: str = "no file was written")
         return [], f"{nothing}: {error.actual}; expected: {error.expected}"
 
 
-def show(
-    answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False, unwritten: str = ""
-) -> None:
-    """Print an answer with its `files`, or with the reason why they are `unwritten`.
+def show(answer: Answer, shown: Shown, write: Write | None, nothing: str = "no file was written") -> None:
+    """Print an answer, and write its files by `write`.
 
-    The answer is printed as JSON with `as_json`, and with its details if `details` is set. Raises typer.Exit with the
-    status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
+    The first sentences are printed before the files are drawn. If writing fails, `nothing` says what is missing. Raises
+    typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
     """
-    written = [*files]
-    if as_json:
-        print_document(answer.to_dict(details), written)
+    for sentence in () if shown.as_json else answer.sentences():
+        print_wrapped(sentence)
+    sys.stdout.flush()
+    written, unwritten = [], ""
+    if write is not None:
+        with ProgressBar(DRAWING) as progress:
+            written, unwritten = tried(lambda: write(progress), nothing)
+    if shown.as_json:
+        print_document(answer.to_dict(shown.details), written)
     else:
-        for sentence in answer.sentences():
-            print_wrapped(sentence)
+        details = shown.details
         for block in answer.blocks():
             print(f"\n{block}\n")
         tables = answer.tables()

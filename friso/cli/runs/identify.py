@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import speak_of
-from friso.cli.asking import DRAWING, Shown, named_as_options, show, tried
+from friso.cli.asking import Shown, named_as_options, show
 from friso.cli.common import say
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -49,11 +49,9 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
             )
         except OpenQuestions as error:
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
-        speak_of(answer.axis_kind)
-        progress(0, 0, DRAWING)
-        with drawing_beside():
-            files, unwritten = tried(lambda: target.write(answer.files(), progress))
-    show(answer, [*files, *kept] if files else [], shown.as_json, shown.details, unwritten)
+    speak_of(answer.axis_kind)
+    with drawing_beside():
+        show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])
 
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:

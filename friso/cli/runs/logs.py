@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
-from friso.cli.asking import Shown, named_as_options, show, tried
+from friso.cli.asking import Shown, named_as_options, show
 from friso.cli.progress import ProgressBar
 from friso.interface.question import Question
 
@@ -15,9 +16,8 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     from friso.interface.output_folder import output_folder
 
     target = output_folder(question.name, shown.out, shown.overwrite, about[0])
-    files, unwritten = [], ""
     with ProgressBar(question.during) as progress, named_as_options(question.options):
         answer = question.function(*about, **options, folder=shown.out, partly=True, progress=progress)
-        if target is not None and answer.result:
-            files, unwritten = tried(lambda: target.write(answer.files(), progress))
-    show(answer, files, shown.as_json and not answer.errors, unwritten=unwritten)
+    writes = target is not None and answer.result
+    shown = replace(shown, as_json=shown.as_json and not answer.errors)
+    show(answer, shown, (lambda progress: target.write(answer.files(), progress)) if target and writes else None)

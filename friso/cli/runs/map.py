@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from friso.cli.asking import Shown, named_as_options, show, tried
+from friso.cli.asking import Shown, named_as_options, show
 from friso.cli.progress import ProgressBar
 from friso.interface.question import Question
+from friso.progress import Progress
 
 
 def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], shown: Shown) -> None:
@@ -21,17 +22,18 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     (source,) = about
     if options.get("check"):
         with named_as_options(question.options):
-            return show(question.function(source, check=True), [], shown.as_json)
+            return show(question.function(source, check=True), shown, None)
     store, elsewhere = shown.out or Path(f"{source.stem}_map.zarr"), None
     if source.is_dir():
         store, elsewhere = None, output_folder(question.name, shown.out, shown.overwrite)
     options = {**options, "overwrite": shown.overwrite, "out": store}
-    with ProgressBar() as progress, drawing_beside(), named_as_options(question.options):
-        answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
+    with drawing_beside():
+        with ProgressBar() as progress, named_as_options(question.options):
+            answer = question.function(source, **options, beside=elsewhere is None, progress=progress)
         speak_of(answer.axis_kind)
         place = answer.store or source
 
-        def written() -> list[Path]:
+        def write(progress: Progress) -> list[Path]:
             """Write figure, page and exports, and return their paths.
 
             The files go beside the store, or into a folder given by --out.
@@ -40,5 +42,4 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
                 return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
             return write_beside(answer.files_beside(progress), place, shown.overwrite, progress)
 
-        files, unwritten = tried(written, f"the runs are in {place}, but no figure was written")
-    show(answer, files, shown.as_json, unwritten=unwritten)
+        show(answer, shown, write, f"the runs are in {place}, but no figure was written")
