@@ -200,7 +200,7 @@ def shown_by(log: Log, machine: Machine) -> set[str]:
     truth = np.array([parameter.inner(parameter.start) for parameter in parameters])
     names = [parameter.name for parameter in parameters]
     truth[names.index(RATIO)] = flat["friction.static"] / flat["friction.coulomb"]
-    ((_, slopes),) = problem.jacobians(truth[None], np.ones((1, len(truth)), bool))
+    (slopes,) = problem.jacobians(truth[None], np.ones((1, len(truth)), bool), problem.residuals(truth[None]))
     noise = np.hypot(machine.force_noise, machine.force_digit / np.sqrt(12))
     size = np.linalg.norm(slopes, axis=0)
     spread = noise * np.sqrt(np.diag(np.linalg.pinv((slopes / size).T @ (slopes / size)))) / size

@@ -732,11 +732,11 @@ class Valley:
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         return self._off(inner)
 
-    def jacobians(self, inner: np.ndarray, free: np.ndarray, rests: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        assert np.array_equal(rests, self._off(inner))
+    def jacobians(self, inner: np.ndarray, free: np.ndarray, residuals: np.ndarray) -> list[np.ndarray]:
+        assert np.array_equal(residuals, self._off(inner))
         self.asked.append(len(inner))
-        slopes = [self.weight * np.array([[-20 * a, 10.0], [-1.0, 0.0]]) for a, _ in inner]
-        return list(zip(rests, slopes, strict=True))
+        every = [self.weight * np.array([[-20 * a, 10.0], [-1.0, 0.0]]) for a, _ in inner]
+        return [slopes[:, chosen] for slopes, chosen in zip(every, free, strict=True)]
 
 
 def test_a_refined_fit_finds_its_way_along_a_valley_with_few_derivatives() -> None:
@@ -751,14 +751,34 @@ def test_a_refined_fit_finds_its_way_along_a_valley_with_few_derivatives() -> No
     assert sum(pieces[0].asked) < 2 * iterations
 
 
-def test_a_refined_fit_goes_on_from_derivatives_that_are_only_near() -> None:
-    """Derivatives of the start's surroundings lead down, and the fit ends with its own."""
+NEAR = np.array([[-20 * 1.2, 10.0], [-1.0, 0.0]])
+"""Derivatives of the valley beside its lowest place, at a = 1.2."""
+
+
+@pytest.mark.parametrize("near", [NEAR, -NEAR, np.full((2, 2), np.inf)], ids=["near", "uphill", "infinite"])
+def test_a_refined_fit_goes_on_from_derivatives_that_are_only_near(near: np.ndarray) -> None:
+    """Derivatives of the start's surroundings may even lead uphill: the fit ends with its own."""
     pieces, starts = [Valley(1.0)], np.array([[1.1, 1.3], [0.8, 0.7]])
-    near = np.array([[-20 * 1.2, 10.0], [-1.0, 0.0]])
     every = np.ones(starts.shape, bool)
     refined = refine_fit(cast("list[Problem]", pieces), starts, every, 25, 1e-9, slopes=near)
     assert refined.inner == pytest.approx(np.ones(starts.shape), abs=1e-3)
     assert sum(pieces[0].asked) > 0
+
+
+def test_derivatives_by_a_number_that_is_held_may_be_infinite() -> None:
+    """The cost with `a` held at 1.2 is lowest in the valley, with or without a derivative by `a`."""
+    starts, free = np.array([[1.2, 1.0]]), np.array([[False, True]])
+    held = np.array([[np.inf, 10.0], [np.inf, 0.0]])
+    refined = refine_fit(cast("list[Problem]", [Valley(1.0)]), starts, free, 5, 1e-9, slopes=held)
+    assert refined.inner[0] == pytest.approx([1.2, 1.44], abs=1e-6)
+
+
+def test_a_fit_is_abandoned_only_by_its_own_derivatives() -> None:
+    """Derivatives that lead uphill say nothing about the pace at which a fit would fall."""
+    starts, every = np.array([[0.8, 0.7]]), np.ones((1, 2), bool)
+    problem = cast("list[Problem]", [Valley(1.0)])
+    refined = refine_fit(problem, starts, every, 25, 1e-9, aim=1e-6, slopes=-NEAR)
+    assert refined.cost[0] < 1e-6
 
 
 class Sudden(Problem):

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -513,3 +514,14 @@ def test_a_file_that_is_overwritten_keeps_its_permissions_and_its_link(tmp_path:
     with pytest.raises(InputError, match="read-only"):
         write_file("FILE", link, "newer", True)
     assert file.read_text() == "new"
+
+
+def test_files_are_written_though_nobody_reads_the_answer(tmp_path: Path) -> None:
+    """A pager that was left while a command computed took the files with it."""
+    read, full = os.pipe()
+    os.close(read)
+    program = [sys.executable, "-m", "friso", "bode", str(RIG), "--out", str(tmp_path / "answer")]
+    done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True, timeout=300)
+    os.close(full)
+    assert done.returncode == 1
+    assert (tmp_path / "answer" / "bode.html").exists()

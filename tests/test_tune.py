@@ -676,9 +676,7 @@ def test_a_pair_is_tried_only_where_no_change_of_the_controller_works(rigid: Sta
     assert pairs([closest, isolator], goal)
 
 
-def test_ctrl_c_leaves_the_best_so_far(
-    tuning: Advice, wording: Wording, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording, capsys: pytest.CaptureFixture[str]) -> None:
     assert tuning.interrupted
     assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
     first = answer(tuning)[0]

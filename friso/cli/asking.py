@@ -89,15 +89,22 @@ def show(answer: Answer, shown: Shown, write: Write | None, nothing: str = "no f
     """Print an answer, and write its files by `write`.
 
     The first sentences are printed before the files are drawn. If writing fails, `nothing` says what is missing. Raises
-    typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted.
+    typer.Exit with the status of a failure. Raises KeyboardInterrupt after an answer that was interrupted. Raises
+    OSError, after writing the files, if the output cannot be printed.
     """
-    for sentence in () if shown.as_json else answer.sentences():
-        print_wrapped(sentence)
-    sys.stdout.flush()
+    unprinted: OSError | None = None
+    try:
+        for sentence in () if shown.as_json else answer.sentences():
+            print_wrapped(sentence)
+        sys.stdout.flush()
+    except OSError as error:  # as by a pager that was closed: the files are still wanted
+        unprinted = error
     written, unwritten = [], ""
     if write is not None:
         with ProgressBar(DRAWING) as progress:
             written, unwritten = tried(lambda: write(progress), nothing)
+    if unprinted is not None:
+        raise unprinted
     if shown.as_json:
         print_document(answer.to_dict(shown.details), written)
     else:

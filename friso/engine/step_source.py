@@ -68,7 +68,7 @@ UNWATCHED = ("old_time", "taken", "deviation_max", "deviation_min", "inner_exit"
 NO_SWING = 1e-6
 """Rate, over the velocity's tolerance, below which a deviation turns only by rounding."""
 
-WATCHED = "good & (entered | turned)"
+INSIDE = "good & (entered | turned)"
 """Condition under which the loops around the step must look inside the step of a run."""
 
 DIVERGED = 1e6
@@ -510,10 +510,10 @@ class StepWriter:
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",
             f"happened = good & ({'' if self.model.clock else '(now >= next_sample) | '}(t_n >= stop))",
-            f"watched = {'False' if self.model.clock else WATCHED}",
+            f"within = {'False' if self.model.clock else INSIDE}",
             "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
             f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._position}",
-            "event = 2.0 if watched else (1.0 if happened | failed else 0.0)",
+            "event = 2.0 if within else (1.0 if happened | failed else 0.0)",
             "event = 3.0 if diverged else event",
             "fraction = fraction if good else 0.0",
         ]

@@ -1,7 +1,7 @@
 """Prepare the command line before the rest of friso is imported.
 
 A signal during the import is remembered. No module is loaded from the current folder, which may belong to someone else.
-NumPy computes in one thread.
+OpenBLAS, with which NumPy is usually built, computes in one thread unless the environment says otherwise.
 The module has no effect if friso is used as a library.
 """
 
@@ -53,8 +53,8 @@ def _ignore() -> None:
 
 
 if IS_COMMAND:
-    # read when NumPy is loaded; its threads would wait busily beside those of the engine
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if "OMP_NUM_THREADS" not in os.environ:  # read when NumPy is loaded; idle threads wait busily beside the engine's
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # ignored by nohup
             signal.signal(number, _note)

@@ -18,6 +18,6 @@ def run(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
     target = output_folder(question.name, shown.out, shown.overwrite, about[0])
     with ProgressBar(question.during) as progress, named_as_options(question.options):
         answer = question.function(*about, **options, folder=shown.out, partly=True, progress=progress)
-    writes = target is not None and answer.result
+    folder = target if answer.result else None
     shown = replace(shown, as_json=shown.as_json and not answer.errors)
-    show(answer, shown, (lambda progress: target.write(answer.files(), progress)) if target and writes else None)
+    show(answer, shown, None if folder is None else lambda progress: folder.write(answer.files(), progress))

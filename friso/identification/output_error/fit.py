@@ -283,11 +283,11 @@ def polished(
         [problem], inner[None], mask[None], settings.iterations_of_a_fit, settings.cost_share_of_a_fit, progress,
         slopes=slopes,
     ).inner[0]  # fmt: skip
-    rest, own = problem.linearised(best, mask)
-    covariance = spread_along(problem, own, rest)
-    moved = [_moved_by(inputs, problem, best, own, rest) for inputs in problem.unsettled]
+    rest, fitted = problem.linearised(best, mask)
+    covariance = spread_along(problem, fitted, rest)
+    moved = [_moved_by(inputs, problem, best, fitted, rest) for inputs in problem.unsettled]
     fit = OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
-    vars(fit)["linearised"] = (rest, own)
+    vars(fit)["linearised"] = (rest, fitted)
     return fit
 
 

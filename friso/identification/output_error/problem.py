@@ -142,25 +142,18 @@ class Problem:
             residuals[numbers] = (self.target - record.force) * self.counted
         return np.where(np.isfinite(residuals), residuals, np.inf)
 
-    def jacobians(
-        self, inner: np.ndarray, free: np.ndarray, rests: np.ndarray | None = None
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return residual and derivatives for each row of fitted numbers, shape (rows, parameters).
+    def jacobians(self, inner: np.ndarray, free: np.ndarray, residuals: np.ndarray) -> list[np.ndarray]:
+        """Return the derivatives of the residuals for each row of fitted numbers, (rows, parameters).
 
-        The residual has the shape (n,), the derivatives (n, free) for the numbers that are `free` in that row. All
-        come from runs side by side. `rests` are the residuals [N] of the rows, (rows, n), if they are known.
+        They have the shape (n, free) for the numbers that are `free` in that row. `residuals` [N] are those of the
+        rows, (rows, n). All come from runs side by side.
         """
         owner, number = np.nonzero(free)
         steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
         moved = inner[owner].copy()
         moved[np.arange(len(owner)), number] += steps
-        if rests is None:
-            residuals = self.residuals(np.vstack([inner, moved]))
-            rests, off = residuals[: len(inner)], residuals[len(inner) :]
-        else:
-            off = self.residuals(moved)
-        slopes = (off - rests[owner]) / steps[:, None]
-        return [(rests[row], slopes[owner == row].T) for row in range(len(inner))]
+        slopes = (self.residuals(moved) - residuals[owner]) / steps[:, None]
+        return [slopes[owner == row].T for row in range(len(inner))]
 
     def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the residual [N], (n,), of fitted numbers, and its derivatives, (n, free).

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.refine import Refined, bounds_of, costs, refine_fit
+from friso.identification.output_error.refine import Refined, bounds_of, mean_square, refine_fit
 from friso.identification.output_error.settings import OutputErrorSettings
 
 WORSE = float(chi2.ppf(0.95, 1))
@@ -70,11 +70,11 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
     if not others:
-        return Refined(starts, costs([fit.problem], starts))
+        return Refined(starts, mean_square(fit.problem.residuals(starts)))
     following = starts.copy()
     following[:, list(others)] += np.outer(values - fit.inner[number], _following(fit, number, others))
     following = np.clip(following, *bounds_of(fit.problem))
-    stay, follow = costs([fit.problem], np.vstack([starts, following])).reshape(2, -1)
+    stay, follow = mean_square(fit.problem.residuals(np.vstack([starts, following]))).reshape(2, -1)
     inner, cost = np.where((follow < stay)[:, None], following, starts), np.minimum(stay, follow)
     away = ~np.isclose(values, fit.inner[number], rtol=0, atol=1e-6 * np.ptp(values))
     free = np.zeros(starts.shape, bool)

@@ -30,16 +30,6 @@ def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def costs(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
-    """Return mean squares of the residuals [N^2], (runs,), of fitted numbers (runs, parameters)."""
-    costs = np.zeros(len(inner))
-    for problem in pieces:
-        for numbers, record in problem.simulated(inner):
-            costs[numbers] += np.sum(((problem.target - record.force) * problem.counted) ** 2, axis=1)
-    costs /= sum(len(problem.target) for problem in pieces)
-    return np.where(np.isfinite(costs), costs, np.inf)
-
-
 def refine_fit(
     pieces: Sequence[Problem],
     starts: np.ndarray,
@@ -56,10 +46,11 @@ def refine_fit(
     its sum of squares falls by less than the fraction `enough`.
 
     For every start several dampings are tried side by side, which costs less than derivatives. After a step the
-    derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6); they
-    are computed anew if the residual falls by much less than they predict. `slopes`, shape (samples, parameters), are
+    derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6). They
+    are computed anew if it falls little, or by much less than they predict. `slopes`, shape (samples, parameters), are
     derivatives near the starts, if they are known. A number at an end of its range stays there while it is driven
-    outwards. A fit that would not fall to the mean square `aim` at the pace of its last iteration is abandoned.
+    outwards. A fit that would not fall to the mean square `aim` at the pace of its last iteration is abandoned. Only
+    derivatives computed at its own numbers end or abandon a fit.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
@@ -67,11 +58,12 @@ def refine_fit(
     low, high = low + margin, high - margin
     inner = np.clip(starts, low, high)
     rest = _residuals(pieces, inner)
-    cost = _mean_square(rest)
+    cost = mean_square(rest)
     damping = np.full(len(inner), settings.first_damping)
     busy = np.isfinite(cost)
-    exact, asked = np.zeros(len(inner), bool), busy & (slopes is None)
-    slopes = np.zeros((*rest.shape, inner.shape[1])) if slopes is None else slopes * free[:, None, :]
+    near = np.full((rest.shape[1], inner.shape[1]), np.nan) if slopes is None else slopes
+    slopes = np.where(free[:, None, :], near, 0.0)
+    exact, asked = np.zeros(len(inner), bool), ~np.isfinite(slopes).all(axis=(1, 2))
     for iteration in range(iterations):
         progress(iteration, iterations, "")
         anew = np.flatnonzero(busy & asked)
@@ -81,19 +73,20 @@ def refine_fit(
         if not rows.size:
             break
         dampings = damping[rows, None] * LADDER
-        across = np.swapaxes(slopes[rows], 1, 2)
-        squares, downhill = across @ slopes[rows], -(across @ rest[rows, :, None])[:, :, 0]
+        along = slopes[rows]
+        across = np.swapaxes(along, 1, 2)
+        squares, downhill = across @ along, -(across @ rest[rows, :, None])[:, :, 0]
         inside = ((inner[rows] > low) | (downhill > 0)) & ((inner[rows] < high) | (downhill < 0))
         steps = _steps(squares * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
         trials = np.clip(inner[rows, None] + steps, low, high)
         rests = _residuals(pieces, trials.reshape(-1, inner.shape[1])).reshape(*dampings.shape, -1)
-        squared = _mean_square(rests)
+        squared = mean_square(rests)
         best = np.arange(len(rows)), squared.argmin(axis=1)
         fallen = cost[rows] - squared[best]
         better, slow = fallen > 0, fallen < enough * cost[rows]
         late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
-        linear = (slopes[rows] @ (trials[best] - inner[rows])[:, :, None])[:, :, 0]
-        predicted = cost[rows] - _mean_square(rest[rows] + linear)
+        linear = (along @ (trials[best] - inner[rows])[:, :, None])[:, :, 0]
+        predicted = cost[rows] - mean_square(rest[rows] + linear)
         poor = fallen < settings.share_of_predicted_fall * predicted
         raised = np.where(exact[rows], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0], damping[rows])
         damping[rows] = np.where(better, dampings[best], raised)
@@ -102,43 +95,47 @@ def refine_fit(
         exact[rows[better]] = False
         rows, best = rows[better], (best[0][better], best[1][better])
         missed = rests[best] - rest[rows] - linear[better]
-        slopes[rows] += _update(trials[best] - inner[rows], missed, squares[better])
+        weights = _weights(trials[best] - inner[rows], squares[better])
+        for row, unpredicted, weight in zip(rows, missed, weights, strict=True):
+            slopes[row] += np.outer(unpredicted, weight)
         inner[rows], cost[rows], rest[rows] = trials[best], squared[best], rests[best]
     return Refined(inner, cost)
 
 
-def _update(step: np.ndarray, missed: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """Return the change of derivatives after steps (rows, parameters), shape (rows, samples, parameters).
+def _weights(steps: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Return the shares of a change of the residual in its derivatives, for steps (rows, parameters).
 
-    `missed` (rows, samples) is the change of the residual that the derivatives did not predict. `squares` (rows,
-    parameters, parameters) are products of derivatives, whose diagonal scales the parameters.
+    The result has the shape of the steps. `squares` (rows, parameters, parameters) are products of derivatives, whose
+    diagonal scales the parameters.
     """
-    weighted = np.diagonal(squares, axis1=1, axis2=2) * step
-    length = np.sum(weighted * step, axis=1, keepdims=True)
-    along = np.divide(weighted, length, out=np.zeros_like(step), where=length > 0)
-    return missed[:, :, None] * along[:, None, :]
+    weighted = np.diagonal(squares, axis1=1, axis2=2) * steps
+    length = np.sum(weighted * steps, axis=1, keepdims=True)
+    return np.divide(weighted, length, out=np.zeros_like(steps), where=length > 0)
 
 
 def _residuals(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
-    """Return the residuals [N] of all pieces for fitted numbers (runs, parameters), shape (runs, samples)."""
+    """Return the residuals [N] of all pieces for fitted numbers (runs, parameters), shape (runs, samples).
+
+    They are infinite for runs that failed.
+    """
     return np.concatenate([problem.residuals(inner) for problem in pieces], axis=1)
 
 
-def _mean_square(residuals: np.ndarray) -> np.ndarray:
-    """Return the mean squares of residuals over their last axis; infinite if one is not finite."""
+def mean_square(residuals: np.ndarray) -> np.ndarray:
+    """Return the mean squares of residuals over their last axis."""
     return np.mean(residuals**2, axis=-1)
 
 
-def _derivatives(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray, rests: np.ndarray) -> np.ndarray:
+def _derivatives(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Return the derivatives of the residuals by fitted numbers, shape (rows, samples, parameters).
 
-    They are 0 for numbers that are not `free`. `rests` are the residuals [N], (rows, samples).
+    They are 0 for numbers that are not `free`. `rest` has the residuals [N], (rows, samples).
     """
     slopes = np.zeros((len(inner), sum(len(problem.target) for problem in pieces), inner.shape[1]))
     first = 0
     for problem in pieces if len(inner) else ():
         part = slice(first, first := first + len(problem.target))
-        for row, (_, jacobian) in enumerate(problem.jacobians(inner, free, rests[:, part])):
+        for row, jacobian in enumerate(problem.jacobians(inner, free, rest[:, part])):
             slopes[row][part, free[row]] = jacobian
     return slopes
 

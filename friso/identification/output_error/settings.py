@@ -35,10 +35,10 @@ class OutputErrorSettings(Settings):
     stretches_of_a_screening: int = setting(8, "")
     """Stretches into which a long record is cut for its starts, because slow motion may occur anywhere."""
 
-    iterations_of_first_starts: int = setting(3, "")
+    iterations_of_first_starts: int = setting(5, "")
     """Number of iterations of the brief refinement, which shows how good a start is."""
 
-    iterations_of_further_starts: int = setting(5, "")
+    iterations_of_further_starts: int = setting(7, "")
     """Number of further iterations of the starts kept after the brief refinement."""
 
     iterations_of_a_fit: int = setting(30, "")
