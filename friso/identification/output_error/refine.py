@@ -63,12 +63,12 @@ def refine_fit(
     busy = np.isfinite(cost)
     near = np.full((rest.shape[1], inner.shape[1]), np.nan) if slopes is None else slopes
     slopes = np.where(free[:, None, :], near, 0.0)
-    exact, asked = np.zeros(len(inner), bool), ~np.isfinite(slopes).all(axis=(1, 2))
+    exact, asked = np.zeros(len(inner), bool), ~np.all(np.isfinite(slopes), axis=(1, 2))
     for iteration in range(iterations):
         progress(iteration, iterations, "")
         anew = np.flatnonzero(busy & asked)
         slopes[anew], exact[anew] = _derivatives(pieces, inner[anew], free[anew], rest[anew]), True
-        busy &= np.isfinite(slopes).all(axis=(1, 2)) & (damping < settings.highest_damping)
+        busy &= np.all(np.isfinite(slopes), axis=(1, 2)) & (damping < settings.highest_damping)
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
