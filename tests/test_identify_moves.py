@@ -21,6 +21,7 @@ from friso.identification.doubt import DOUBTS, FitCase, RecordCase, leading_effe
 from friso.identification.doubts import coupling, delay, force_digits, friction_by_direction, load_friction, play
 from friso.identification.errors import errors_of
 from friso.identification.estimate import Estimate
+from friso.identification.experiments.moves import _play_that_looks_alike
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.integrated import integrated
 from friso.identification.logs.log import Log
@@ -32,7 +33,7 @@ from friso.identification.output_error.holding import with_force_settled, with_s
 from friso.identification.output_error.identifiable import IdentifiableFit, believed, bounds_as_much
 from friso.identification.output_error.parameters import BRISTLES, EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
-from friso.identification.output_error.refine import bounds_of, costs
+from friso.identification.output_error.refine import bounds_of, mean_square
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality
@@ -277,7 +278,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
             first[i] = parameter.inner(kept.get(parameter.name, flat.get(parameter.name)))
     first[names.index("mass")] += 0.1
     fitted = fit(exact, core, first[None])
-    assert fitted.cost < 1e-6 * float(costs([exact], first[None])[0])
+    assert fitted.cost < 1e-6 * float(mean_square(exact.residuals(first[None]))[0])
     assert fitted.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
     assert fitted.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
 
@@ -660,3 +661,13 @@ def test_what_friction_does_at_the_reversals_of_a_sine_is_no_delay_and_no_coupli
     """Delays of 4 to 100 ms were named, and a coupling that changed the mass infinitely."""
     case = fit_case(log := on_bristles(rate, step, 20.0), *rigid(log), led=False)
     assert not "".join(one.words for doubt in (delay, coupling) for one in doubt.find(case))
+
+
+def test_bristles_are_told_with_the_play_that_looks_alike() -> None:
+    """A play of 19 um was fitted as bristles of 61 kN/m that bend by 14 um; the true ones had 186 kN/m."""
+    friction = Estimate.normal("friction.coulomb", "N", 0.86, 0.01, "output error")
+    soft = Estimate.normal("friction.bristle_stiffness", "N/m", 61e3, 2e3, "output error")
+    hidden = Estimate.unknown("friction.bristle_stiffness", "N/m", "output error", "no slow motion")
+    (note,) = _play_that_looks_alike([(friction, hidden), (friction, soft)])
+    assert "14 um" in note
+    assert not _play_that_looks_alike([(friction, hidden)])

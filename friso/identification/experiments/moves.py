@@ -37,6 +37,11 @@ OUT_OF_STEP = (
     "mass it is tuned for), or noise of its encoder moves it, which is not simulated"
 )
 
+ALIKE = (
+    "a play of about {} between motor and load would look like these bristles: their stiffness holds for an axis "
+    "without play"
+)
+
 
 def _claims(course: Course) -> str | None:
     """Return why a log holds moves, or None.
@@ -109,12 +114,25 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER if stage is None else WITHOUT_REFERENCE] if followed else []),
         *(f"{result.log.name}: {OUT_OF_STEP}" for result in loops if not result.fit.problem.closed),
+        *_play_that_looks_alike([result.estimates for result in results]),
         *(
             f"{log.name}: of a log this long {settings.samples_of_moves} samples are used, {_span(log)}, where it "
             "moves most"
             for log in long
         ),
     ]
+
+
+def _play_that_looks_alike(answers: Sequence[Sequence[Estimate]]) -> list[str]:
+    """Return a note on the play that would pass for the identified bristles; none without bristles.
+
+    Its width is about their bend before sliding, Coulomb friction over stiffness: plays of two to four bends of the
+    true bristles were fitted to the noise by softer ones (docs/evidence/identify.md). The widest of several is told.
+    """
+    values = [{one.name: one.value for one in estimates if one.determined} for estimates in answers]
+    needed = "friction.coulomb", "friction.bristle_stiffness"
+    bends = [one[needed[0]] / one[needed[1]] for one in values if one.keys() >= {*needed}]
+    return [ALIKE.format(f"{max(bends) * 1e6:.2g} um")] if bends else []
 
 
 def _span(log: Log) -> str:
