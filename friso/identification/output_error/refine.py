@@ -48,9 +48,8 @@ def refine_fit(
     For every start several dampings are tried side by side, which costs less than derivatives. After a step the
     derivatives are updated from the change of the residual (Broyden 1965, doi:10.1090/S0025-5718-1965-0198670-6). They
     are computed anew if it falls little, or by much less than they predict. `slopes`, shape (samples, parameters), are
-    derivatives near the starts, if they are known. A number at an end of its range stays there while it is driven
-    outwards. A fit that would not fall to the mean square `aim` at the pace of its last iteration is abandoned. Only
-    derivatives computed at its own numbers end or abandon a fit.
+    derivatives near the starts, if they are known. A fit that would not fall to the mean square `aim` at the pace of
+    its last iteration is abandoned. Only derivatives computed at its own numbers end or abandon a fit.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(pieces[0])
@@ -72,34 +71,70 @@ def refine_fit(
         rows = np.flatnonzero(busy)
         if not rows.size:
             break
-        dampings = damping[rows, None] * LADDER
-        along = slopes[rows]
-        across = np.swapaxes(along, 1, 2)
-        squares, downhill = across @ along, -(across @ rest[rows, :, None])[:, :, 0]
-        inside = ((inner[rows] > low) | (downhill > 0)) & ((inner[rows] < high) | (downhill < 0))
-        steps = _steps(squares * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
-        trials = np.clip(inner[rows, None] + steps, low, high)
-        rests = _residuals(pieces, trials.reshape(-1, inner.shape[1])).reshape(*dampings.shape, -1)
-        squared = mean_square(rests)
-        best = np.arange(len(rows)), squared.argmin(axis=1)
-        fallen = cost[rows] - squared[best]
+        step = _best_steps(pieces, inner[rows], rest[rows], slopes[rows], damping[rows, None] * LADDER, (low, high))
+        fallen = cost[rows] - step.cost
         better, slow = fallen > 0, fallen < enough * cost[rows]
         late = cost[rows] - (iterations - iteration) * np.maximum(fallen, 0.0) > aim
-        linear = (along @ (trials[best] - inner[rows])[:, :, None])[:, :, 0]
-        predicted = cost[rows] - mean_square(rest[rows] + linear)
-        poor = fallen < settings.share_of_predicted_fall * predicted
-        raised = np.where(exact[rows], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0], damping[rows])
-        damping[rows] = np.where(better, dampings[best], raised)
+        poor = fallen < settings.share_of_predicted_fall * (cost[rows] - step.predicted)
+        raised = np.where(exact[rows], damping[rows] * LADDER[-1] * (LADDER[1] / LADDER[0]) / LADDER[0], damping[rows])
+        damping[rows] = np.where(better, step.damping, raised)
         busy[rows] = ~(exact[rows] & (late | (better & slow)))
         asked[rows] = np.where(better, poor | slow | late, ~exact[rows])
-        exact[rows[better]] = False
-        rows, best = rows[better], (best[0][better], best[1][better])
-        missed = rests[best] - rest[rows] - linear[better]
-        weights = _weights(trials[best] - inner[rows], squares[better])
-        for row, unpredicted, weight in zip(rows, missed, weights, strict=True):
-            slopes[row] += np.outer(unpredicted, weight)
-        inner[rows], cost[rows], rest[rows] = trials[best], squared[best], rests[best]
+        taken, rows = np.flatnonzero(better), rows[better]
+        for k, row in zip(taken, rows, strict=True):
+            slopes[row] += np.outer(step.missed[k], step.weights[k])
+        inner[rows], cost[rows], rest[rows] = step.inner[taken], step.cost[taken], step.residual[taken]
+        exact[rows] = False
     return Refined(inner, cost)
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """The best of several damped steps of each row.
+
+    Fields are the numbers after it, (rows, parameters), with their `residual` [N], (rows, samples), and its mean square
+    `cost` [N^2], (rows,); the `damping`, (rows,); the mean square `predicted` by the derivatives, (rows,); the part of
+    the residual's change that they `missed`, (rows, samples), and the `weights`, (rows, parameters), with which it
+    enters the derivatives by the parameters.
+    """
+
+    inner: np.ndarray
+    residual: np.ndarray
+    cost: np.ndarray
+    damping: np.ndarray
+    predicted: np.ndarray
+    missed: np.ndarray
+    weights: np.ndarray
+
+
+def _best_steps(
+    pieces: Sequence[Problem],
+    inner: np.ndarray,
+    rest: np.ndarray,
+    slopes: np.ndarray,
+    dampings: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+) -> _Steps:
+    """Try several dampings, shape (rows, dampings), of each row of numbers (rows, parameters); return the best steps.
+
+    `rest` [N] has the residuals, (rows, samples), and `slopes` their derivatives, (rows, samples, parameters). `ends`
+    are those of the parameters' ranges: a number at one of them stays there while it is driven outwards.
+    """
+    low, high = ends
+    across = np.swapaxes(slopes, 1, 2)
+    squares, downhill = across @ slopes, -(across @ rest[:, :, None])[:, :, 0]
+    inside = ((inner > low) | (downhill > 0)) & ((inner < high) | (downhill < 0))
+    steps = _steps(squares * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
+    trials = np.clip(inner[:, None] + steps, low, high)
+    rests = _residuals(pieces, trials.reshape(-1, inner.shape[1])).reshape(*dampings.shape, -1)
+    costs = mean_square(rests)
+    best = np.arange(len(inner)), costs.argmin(axis=1)
+    step = trials[best] - inner
+    linear = rest + (slopes @ step[:, :, None])[:, :, 0]
+    weights = _weights(step, squares)
+    return _Steps(
+        trials[best], rests[best], costs[best], dampings[best], mean_square(linear), rests[best] - linear, weights
+    )
 
 
 def _weights(steps: np.ndarray, squares: np.ndarray) -> np.ndarray:
