@@ -36,9 +36,9 @@ class ToleranceSettings(Settings):
     long_run_rtol: float = setting(1e-6, "")
     """Tolerance of runs that only show how a motion ends. Times and widths come from finer runs."""
 
-    slope_rtol_factor: float = setting(100.0, "of cycle_rtol")
-    """Tolerance of runs for the slope of a return map, relative to that of cycles. The slope is taken over a wide
-    range."""
+    chattering_rtol_factor: float = setting(100.0, "of cycle_rtol")
+    """Tolerance where a limiter chatters, and of runs for the slope of a return map, relative to that of cycles. The
+    chatter moves the end of a run by far more."""
 
     held_rtol_factor: float = setting(10.0, "of cycle_rtol")
     """Tolerance of runs beside a cycle, relative to that of cycles. Rougher runs would blur narrow ranges."""

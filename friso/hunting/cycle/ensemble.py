@@ -16,6 +16,7 @@ from friso.equations.motion import without_motion
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, carrying_force, shared_structure
 from friso.hunting.cycle.settings import OrbitSettings
+from friso.hunting.settings import ToleranceSettings
 from friso.stage.transmission import BACKLASH
 
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
@@ -77,6 +78,10 @@ class Ensemble:
         """
         controller = self.structure.controller
         return self.structure.joint == "free" or (controller is not None and bool(controller.settings.push))
+
+    def useful(self, rtol: float) -> float:
+        """Return the relative tolerance of runs on a cycle: `rtol`, or a wider one where a limiter chatters."""
+        return ToleranceSettings.current().chattering_rtol_factor * rtol if self.chatters else rtol
 
     @property
     def remember(self) -> bool:

@@ -107,10 +107,10 @@ class OrbitSettings(Settings):
     slope_range_share: float = setting(0.01, "of the distance")
     """Range of the return map's slope where a limiter chatters. Over a smaller one the slope follows the chatter."""
 
-    slope_runs: int = setting(41, "")
-    """Runs through which the slope is fitted. Fewer follow the scatter of returns."""
+    slope_runs: int = setting(17, "")
+    """Runs through which the slope is fitted. Fewer follow the scatter of returns; ten times more change it by 2e-4."""
 
-    least_slope_runs: int = setting(30, "")
+    least_slope_runs: int = setting(12, "")
     """Fewest returning runs for the slope of a return map. With fewer, the range crosses a break of the map."""
 
     near_return_share: float = setting(0.25, "of the range")
@@ -133,12 +133,6 @@ class OrbitSettings(Settings):
 
     newton_steps: int = setting(40, "")
     """Most Newton steps. Orbits that need more do not close."""
-
-    rough_gap: float = setting(1e-4, "of the states")
-    """Gap down to which runs may be rough. With a smaller one Newton's method follows their errors."""
-
-    rough_stalled_gap: float = setting(1e-2, "of the states")
-    """Largest gap from which fine runs go on where rough ones stall. No orbit was ever closed from farther off."""
 
     fresh_jacobian_gap: float = setting(1e-5, "of the states")
     """Gap beyond which an old Jacobian misleads Newton's method."""

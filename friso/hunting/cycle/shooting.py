@@ -164,8 +164,7 @@ _S = TypeVar("_S", bound="_Shooting")
 class _Shooting:
     """Newton's method on several orbits at once; closed and failed orbits are left alone.
 
-    Where a limiter chatters, every step needs a new Jacobian. There runs are `rough` as long as the gap is wide: their
-    errors are far below it, and they take a quarter of the solver's steps.
+    Where a limiter chatters, every step needs a new Jacobian.
     """
 
     def __init__(
@@ -178,7 +177,7 @@ class _Shooting:
         places: np.ndarray | None = None,
     ) -> None:
         tolerances = ToleranceSettings.current()
-        self.family, self.sign, self.rtol = family, sign, rtol
+        self.family, self.sign = family, sign
         self.states, self.times = states.copy(), times.copy()
         count = len(times)
         self.places = np.zeros(count) if places is None else places.copy()
@@ -186,7 +185,8 @@ class _Shooting:
         self.gaps, self.idle = np.full(count, np.inf), np.zeros(count, np.int64)
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
-        self.chatters = family(np.arange(count), self.places).chatters
+        stages = family(np.arange(count), self.places)
+        self.chatters, self.rtol = stages.chatters, stages.useful(rtol)
         self.finest = (
             tolerances.finest_gap_chattering
             if self.chatters
@@ -196,43 +196,29 @@ class _Shooting:
             tolerances.closed_gap_chattering if self.chatters else tolerances.closed_gap,
             OrbitSettings.current().stalled_steps,
         )
-        self.rough_rtol = max(tolerances.guess_rtol, rtol)
-        self.rough = np.full(count, self.chatters and self.rough_rtol > rtol)
 
     def advance(self) -> bool:
         """Take one step of all active orbits, and tell whether any is still active."""
         renewed = self.gaps > OrbitSettings.current().fresh_jacobian_gap if self.chatters else ~self.serves
-        kinds = 2 * self.rough + renewed
-        for which in [np.flatnonzero(self.active & (kinds == kind)) for kind in range(4)]:
-            if which.size:
-                self._advance(which, bool(renewed[which[0]]), self.rough_rtol if self.rough[which[0]] else self.rtol)
-        self._refine()
+        for renew in (False, True):
+            if (which := np.flatnonzero(self.active & (renewed == renew))).size:
+                self._advance(which, renew)
         return bool(self.active.any())
 
-    def _refine(self) -> None:
-        """Let accurate runs replace rough ones that have nearly closed an orbit, or stall near one."""
-        settings = OrbitSettings.current()
-        near = self.rough & (self.gaps < settings.rough_gap)
-        stalled = self.rough & ~near & ~self.active & (self.gaps < settings.rough_stalled_gap)
-        self.states[stalled], self.times[stalled] = self.best_states[stalled], self.best_times[stalled]
-        refined = near | stalled
-        self.rough[refined], self.active[refined] = False, True
-        self.gaps[refined], self.idle[refined] = np.inf, 0
-
-    def _advance(self, which: np.ndarray, renew: bool, rtol: float) -> None:
-        """Take one Newton step of the orbits numbered `which`, with runs to the tolerance `rtol`.
+    def _advance(self, which: np.ndarray, renew: bool) -> None:
+        """Take one Newton step of the orbits numbered `which`.
 
         With `renew` a new Jacobian is computed, otherwise the last one is used again.
         """
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
-            shot = shoot(stages, states, times, self.sign, rtol)
+            shot = shoot(stages, states, times, self.sign, self.rtol)
             ends, fine = shot.ends, shot.done
             for k, jacobian in zip(which, self._jacobians(which, stages, shot), strict=True):
                 self.inverses[k] = _inverse(jacobian)
         else:
-            results = stages.run(states, times, rtol)
+            results = stages.run(states, times, self.rtol)
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
@@ -302,7 +288,7 @@ class _Shooting:
     @property
     def orbits(self) -> Orbits:
         """Return the best orbits so far, and whether they are closed."""
-        closed = (self.gaps < self.limit) & ~self.rough
+        closed = self.gaps < self.limit
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
 
@@ -318,7 +304,6 @@ class _Following(_Shooting):
     def __init__(self, *arguments: Any) -> None:
         tolerances = ToleranceSettings.current()
         super().__init__(*arguments)
-        self.rough[:] = False  # derivatives by place would be those of rough runs' errors
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
