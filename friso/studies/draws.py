@@ -108,24 +108,34 @@ class DrawnEdges:
 def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | None:
     """Find up to which bandwidth the first drawn stages hunt, near the stage's own `margin`.
 
-    The margin is that from the stage to its edge of hunting. Returns None if there is no margin, or if the controller
-    has no bandwidth.
+    The margin is that from the stage to its edge of hunting. The last change between coarse steps of the bandwidth is
+    narrowed down by halving. Returns None if there is no margin, or if the controller has no bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())
     if margin is None or margin.crossover is None or own is None:
         return None
     count = min(sample.count, settings.draws_of_an_edge)
-    factors = np.geomspace(1 / settings.reach_of_an_edge, settings.reach_of_an_edge, settings.steps_of_an_edge)
-    flat = laid_over(stage, {key: np.repeat(values[:count], len(factors)) for key, values in sample.keys.items()})
-    tried = np.tile(margin.crossover * factors, count)
-    attracted = find_attractors(at_bandwidth(flat, tried), len(tried))
-    attracts, certain = (rows.reshape(count, -1) for rows in (attracted.attracts, attracted.certain))
+    coarse = 1 << settings.halvings_of_an_edge
+    steps = coarse * settings.coarse_steps_of_an_edge
+    tried = margin.crossover * np.geomspace(1 / settings.reach_of_an_edge, settings.reach_of_an_edge, steps + 1)
+
+    def hunting(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return 1 where drawn stages hunt at bandwidths given by number, 0 where not, NaN where not certain."""
+        flat = laid_over(stage, {key: values[rows] for key, values in sample.keys.items()})
+        attracted = find_attractors(at_bandwidth(flat, tried[columns]), len(rows))
+        return np.where(attracted.certain, attracted.attracts, np.nan)
+
+    columns = np.arange(0, steps + 1, coarse)
+    hunts = hunting(np.repeat(np.arange(count), len(columns)), np.tile(columns, count)).reshape(count, -1)
+    rows = np.flatnonzero(np.isfinite(hunts).all(axis=1) & np.any(hunts > 0, axis=1) & (hunts[:, -1] == 0))
+    last = coarse * (len(columns) - 1 - hunts[rows, ::-1].argmax(axis=1))
+    for step in (coarse >> n for n in range(1, settings.halvings_of_an_edge + 1)):
+        farther = hunting(rows, last + step)
+        sure = np.isfinite(farther)
+        rows, last = rows[sure], last[sure] + step * farther[sure].astype(np.int64)
     low, high = np.full((2, count), np.nan)
-    for row, (hunts, sure) in enumerate(zip(attracts, certain, strict=True)):
-        last = np.flatnonzero(hunts)
-        if sure.all() and last.size and last[-1] + 1 < len(factors):
-            low[row], high[row] = margin.crossover * factors[last[-1] : last[-1] + 2]
+    low[rows], high[rows] = tried[last], tried[last + 1]
     return DrawnEdges(low, high)
 
 

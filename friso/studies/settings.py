@@ -50,10 +50,13 @@ class StudySettings(Settings):
     """Draws whose amplitude and period are reported. A range of fewer leaves a tenth of the machines out."""
 
     draws_of_an_edge: int = setting(16, "")
-    """Draws whose edge of hunting is searched. Each takes as many searches as `steps_of_an_edge`."""
+    """Draws whose edge of hunting is searched. Each takes as many searches as steps and halvings together."""
 
-    steps_of_an_edge: int = setting(17, "")
-    """Bandwidths tried for each edge. Fewer give a coarser edge."""
+    coarse_steps_of_an_edge: int = setting(4, "")
+    """Steps of the bandwidth at which an edge is looked for. Windows of hunting narrower than a step are missed."""
+
+    halvings_of_an_edge: int = setting(2, "")
+    """Halvings of the step that holds the edge. Fewer give a coarser edge."""
 
     reach_of_an_edge: float = setting(1.6, "")
     """Factor about the stage's own edge of hunting over which bandwidths are tried."""
