@@ -129,8 +129,8 @@ COMPUTED = [
     pytest.param(4, 2.016549, -0.81745, LOCKED, marks=LOCKED_RIG),
     pytest.param(6, 0.903977, -0.86981, LOCKED, marks=LOCKED_RIG),
     pytest.param(8, 0.520247, -0.93119, LOCKED, marks=LOCKED_RIG),
-    pytest.param(3, 4.286370, -0.83271, free(), marks=FREE_RIG),
-    pytest.param(5, 1.990576, -0.95377, free(), marks=FREE_RIG),
+    pytest.param(3, 4.286370, -0.83273, free(), marks=FREE_RIG),
+    pytest.param(5, 1.990576, -0.95382, free(), marks=FREE_RIG),
 ]
 
 
@@ -140,11 +140,11 @@ def test_cycles_of_the_rig_stay_what_they_were(
 ) -> None:
     """Values hold to the digits written: no reference, but maps and verdicts rest on them.
 
-    Where a limiter chatters, the multiplier is the slope through 161 runs; that through the usual number is 1.5e-4 off.
+    At the usual tolerance, 1e-9, the slope where a limiter chatters is off by 8e-5, and so is that of 161 runs.
     """
     cycle = only(rig(crossover, joint), rtol=1e-11)
     assert 1e3 * cycle.amplitude == pytest.approx(amplitude, abs=1e-6)
-    assert cycle.multiplier == pytest.approx(multiplier, abs=2e-5 if joint == LOCKED else 2e-4)
+    assert cycle.multiplier == pytest.approx(multiplier, abs=2e-5)
 
 
 @RIGID
@@ -273,13 +273,19 @@ def test_orbits_are_closed_at_a_rough_tolerance_too() -> None:
 
 
 @FREE_RIG
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6])
+def test_a_chattering_limiter_needs_no_finer_tolerance(rtol: float) -> None:
+    assert only(rig(5, free()), rtol=rtol).multiplier == pytest.approx(-0.95382, abs=2e-3)
+
+
+@FREE_RIG
 def test_a_chattering_limiter_has_a_slope_but_no_smooth_flow() -> None:
     """At 5 Hz the Floquet multiplier converges too, but belongs to a much shorter stretch than the cycle.
 
     Over 1 % of the amplitude the return map is straighter and flatter. At 3 Hz the limiter is touched some thirty times
     a swing; the Floquet multiplier depends on the tolerance by percents, and only the slope means anything.
     """
-    for crossover, depends in ((5, 1e-4), (3, 0.2)):
+    for crossover, depends in ((5, 1e-5), (3, 0.2)):
         rough, fine = only(rig(crossover, free())), only(rig(crossover, free()), TIGHT)
         assert rough.multiplier == rough.slope
         assert rough.multipliers[0].real == pytest.approx(fine.multipliers[0].real, rel=depends)

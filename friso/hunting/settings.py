@@ -36,9 +36,13 @@ class ToleranceSettings(Settings):
     long_run_rtol: float = setting(1e-6, "")
     """Tolerance of runs that only show how a motion ends. Times and widths come from finer runs."""
 
-    chattering_rtol_factor: float = setting(100.0, "of cycle_rtol")
-    """Tolerance where a limiter chatters, and of runs for the slope of a return map, relative to that of cycles. The
-    chatter moves the end of a run by far more."""
+    chattering_rtol: float = setting(1e-7, "")
+    """Tolerance of cycles that may chatter, where many are followed or searched for, and widest one for the slope of a
+    return map. Finer runs change their multipliers by less than the scatter from one stage to the next."""
+
+    slope_rtol_factor: float = setting(100.0, "of cycle_rtol")
+    """Tolerance of runs for the slope of a return map, relative to that of cycles. The slope is taken over a wide
+    range."""
 
     held_rtol_factor: float = setting(10.0, "of cycle_rtol")
     """Tolerance of runs beside a cycle, relative to that of cycles. Rougher runs would blur narrow ranges."""

@@ -49,7 +49,7 @@ def what_attracts(
     an allowance of work is used up.
     """
     if not has_a_map(stages):
-        return _searched(stages, rtol, distances, _Cycles.of(stages, rtol))
+        return _searched(stages, rtol, distances, _Cycles.of(stages, stages.searching_rtol(rtol)))
     survey = survey_maps(stages, rtol)
     decided = survey.resolved | survey.attracts  # a stable closed orbit proves attraction
     quiet = np.array([number for number in confirm if decided[number] and not survey.attracts[number]], dtype=np.int64)

@@ -115,10 +115,10 @@ def attractors(
     """Find the attractors of stages, by simulation from many starts and from the return map.
 
     One attractor of each stage is enough, unless the survey is `thorough`, which looks for all of them. A thorough
-    survey repeats simulations at a hundredth of the tolerance for stages of which no orbit was closed. Orbits are
-    closed to the relative tolerance `rtol`. Runs also start from the `distances` [m], (count, n), where they are
-    finite. Without `cycles`, a motion that has converged counts as attracted, and orbits are closed only from runs that
-    have not converged by the third round.
+    survey repeats simulations at a hundredth of the tolerance for stages of which no orbit was closed. It closes orbits
+    to the relative tolerance `rtol`; other surveys take a wider one for orbits that may chatter. Runs also start from
+    the `distances` [m], (count, n), where they are finite. Without `cycles`, a motion that has converged counts as
+    attracted, and orbits are closed only from runs that have not converged by the third round.
 
     A thorough survey runs all starts at once, as does one with `suggested` cycles: eight runs together take as long as
     one. Both also start runs beside unstable cycles. A stage for which no suggested cycle was closed gets as many
@@ -127,7 +127,7 @@ def attractors(
     If its allowance of work is used up, a thorough survey returns the attractors it has by then; a stage counts as
     decided where an orbit was closed. Other surveys raise Exhausted.
     """
-    at_once = thorough or bool(suggested)
+    at_once, rtol = thorough or bool(suggested), rtol if thorough else stages.searching_rtol(rtol)
     survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=at_once)
     numbers = np.arange(stages.count)
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)

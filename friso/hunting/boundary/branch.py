@@ -141,9 +141,14 @@ class Tracer:
         return self._closed(begin, times, place, target[None], normal, near.jacobians)[0]
 
     @cached_property
+    def beginning(self) -> Ensemble:
+        """Return the stage at the beginning of the line."""
+        return self.family(np.zeros(1, np.int64), np.zeros(1))
+
+    @property
     def chatters(self) -> bool:
         """Tell whether a limiter of the stages on the line chatters, so that multipliers scatter."""
-        return self.family(np.zeros(1, np.int64), np.zeros(1)).chatters
+        return self.beginning.chatters
 
     def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
         """Find cycles on parallel planes at once, from a cycle `near` them all.
@@ -175,12 +180,15 @@ class Tracer:
             """Return the stages at `places`, all on the line that is followed."""
             return self.family(np.zeros(len(places), np.int64), places)
 
-        border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
+        border, rtol = (
+            Border(np.broadcast_to(normal, targets.shape), targets @ normal),
+            self.beginning.searching_rtol(self.rtol),
+        )
         orbits, places, jacobians = close_along(
-            family, states, times, places, border, self.sign, self.rtol, self.swings, jacobians
+            family, states, times, places, border, self.sign, rtol, self.swings, jacobians
         )
         stages = self.family(np.zeros(len(places), np.int64), places)
-        cycles = described(stages, orbits, self.rtol)
+        cycles = described(stages, orbits, rtol)
         usable = orbits.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
         certain = np.all(np.isfinite(jacobians), axis=(1, 2))
         points: list[Point | None] = [None] * len(places)

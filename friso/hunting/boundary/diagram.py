@@ -76,7 +76,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
-    sought, surveyed = families(stages, rtol), attractors(stages, rtol=rtol)
+    sought, surveyed = families(stages, stages.searching_rtol(rtol)), attractors(stages, rtol=rtol)
     hundredth = space.hundredth(np.zeros(1), np.ones(1))
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []

@@ -87,7 +87,8 @@ def edge_curves(space: Space, rtol: float = RTOL, nodes: int | None = None) -> t
     """
     grid = _Grid.of(space, nodes)
     find = symmetric_cycles if grid.stages.symmetric.all() else whole_cycles
-    return _followed(space, grid, [_losing(find(grid.stages, rtol))], rtol, silent)[0]
+    cycles = find(grid.stages, grid.stages.searching_rtol(rtol))
+    return _followed(space, grid, [_losing(cycles)], rtol, silent)[0]
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -166,7 +167,7 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]
     there is a second, an attracting cycle lies between asymmetric ones inside, and has none beside it outside. A stage
     that may have a cycle which was not closed is on neither side.
     """
-    hunting, *pairs = families(stages, rtol)
+    hunting, *pairs = families(stages, stages.searching_rtol(rtol))
     searches = [_losing(hunting)]
     for pair in pairs:
         beside_attracting = hunting.attracting & ~pair.uncertain

@@ -79,9 +79,9 @@ class Ensemble:
         controller = self.structure.controller
         return self.structure.joint == "free" or (controller is not None and bool(controller.settings.push))
 
-    def useful(self, rtol: float) -> float:
-        """Return the relative tolerance of runs on a cycle: `rtol`, or a wider one where a limiter chatters."""
-        return ToleranceSettings.current().chattering_rtol_factor * rtol if self.chatters else rtol
+    def searching_rtol(self, rtol: float) -> float:
+        """Return the relative tolerance at which many cycles are closed: `rtol`, or a wider one if they may chatter."""
+        return max(rtol, ToleranceSettings.current().chattering_rtol) if self.chatters else rtol
 
     @property
     def remember(self) -> bool:

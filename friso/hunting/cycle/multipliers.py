@@ -39,7 +39,7 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     Runs have the relative tolerance `rtol`. The multipliers are growth factors over half a period if the orbits were
     closed over half a period, else over a whole one.
     """
-    shot = shoot(stages, orbits.states, orbits.times, orbits.sign, stages.useful(rtol))
+    shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
     local, direction = _floquet(stages, flows, stages.rates(shot.ends))
     slope = slopes(stages, orbits, direction, rtol) if stages.chatters else np.full(stages.count, np.nan)
@@ -71,9 +71,10 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
     Runs start beside the orbits along a direction (count, states); a straight line is fitted to their returns.
     """
-    settings = OrbitSettings.current()
+    settings, tolerances = OrbitSettings.current(), ToleranceSettings.current()
+    coarser = min(tolerances.slope_rtol_factor * rtol, max(rtol, tolerances.chattering_rtol))
     away = np.linspace(-settings.slope_range_share / 2, settings.slope_range_share / 2, settings.slope_runs)[None, :]
-    heights = returns_of(stages, orbits, direction, away, 2, ToleranceSettings.current().chattering_rtol_factor * rtol)
+    heights = returns_of(stages, orbits, direction, away, 2, coarser)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
 
 

@@ -107,10 +107,10 @@ class OrbitSettings(Settings):
     slope_range_share: float = setting(0.01, "of the distance")
     """Range of the return map's slope where a limiter chatters. Over a smaller one the slope follows the chatter."""
 
-    slope_runs: int = setting(17, "")
-    """Runs through which the slope is fitted. Fewer follow the scatter of returns; ten times more change it by 2e-4."""
+    slope_runs: int = setting(25, "")
+    """Runs through which the slope is fitted. Fewer follow the scatter of returns."""
 
-    least_slope_runs: int = setting(12, "")
+    least_slope_runs: int = setting(18, "")
     """Fewest returning runs for the slope of a return map. With fewer, the range crosses a break of the map."""
 
     near_return_share: float = setting(0.25, "of the range")

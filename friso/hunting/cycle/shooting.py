@@ -164,7 +164,7 @@ _S = TypeVar("_S", bound="_Shooting")
 class _Shooting:
     """Newton's method on several orbits at once; closed and failed orbits are left alone.
 
-    Where a limiter chatters, every step needs a new Jacobian.
+    Where a limiter chatters, every step computes a new Jacobian until the gap is small; then the last one is kept.
     """
 
     def __init__(
@@ -177,7 +177,7 @@ class _Shooting:
         places: np.ndarray | None = None,
     ) -> None:
         tolerances = ToleranceSettings.current()
-        self.family, self.sign = family, sign
+        self.family, self.sign, self.rtol = family, sign, rtol
         self.states, self.times = states.copy(), times.copy()
         count = len(times)
         self.places = np.zeros(count) if places is None else places.copy()
@@ -185,8 +185,7 @@ class _Shooting:
         self.gaps, self.idle = np.full(count, np.inf), np.zeros(count, np.int64)
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
-        stages = family(np.arange(count), self.places)
-        self.chatters, self.rtol = stages.chatters, stages.useful(rtol)
+        self.chatters = family(np.arange(count), self.places).chatters
         self.finest = (
             tolerances.finest_gap_chattering
             if self.chatters
