@@ -176,6 +176,9 @@ def test_the_edge_of_every_draw_is_that_of_its_own_stage(rig: Stage) -> None:
     for row, alone in enumerate((margin, other)):
         assert drawn_edges.low[row] <= 1.001 * alone.crossover
         assert alone.crossover <= 1.001 * drawn_edges.high[row]
+    nowhere = edges(stage, Sample({"friction.static": np.array([own])}, 1, 0, {}), replace(margin, crossover=100.0))
+    assert nowhere is not None
+    assert np.isnan([*nowhere.low, *nowhere.high]).all()
 
 
 def test_loops_of_draws_are_judged(rig: Stage) -> None:

@@ -122,6 +122,8 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
 
     def hunting(rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Return 1 where drawn stages hunt at bandwidths given by number, 0 where not, NaN where not certain."""
+        if not rows.size:
+            return np.zeros(0)
         flat = laid_over(stage, {key: values[rows] for key, values in sample.keys.items()})
         attracted = find_attractors(at_bandwidth(flat, tried[columns]), len(rows))
         return np.where(attracted.certain, attracted.attracts, np.nan)
