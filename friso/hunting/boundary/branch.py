@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -85,7 +84,8 @@ class Tracer:
     `family` gives the stages by place. `sign` is -1 for a cycle closed over half a period, 1 for a whole one; `swings`
     counts its swings in that time (None: the fewest possible). Steps are `pace` times as long as for drawing a curve,
     and at least `shortest`; the first has the length `first`. The cycle is followed while its multiplier is below
-    `steepest`. `hundredth` gives, at a place, the length of line over which the key changes by one per cent.
+    `steepest`. `hundredth` gives, at a place, the length of line over which the key changes by one per cent. Cycles are
+    closed to the relative tolerance `rtol`, or a wider one if they may chatter.
     """
 
     def __init__(
@@ -102,7 +102,9 @@ class Tracer:
         first: float | None = None,
     ) -> None:
         settings = ContinuationSettings.current()
-        self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
+        self.family, self.sign, self.farthest, self.swings = family, sign, farthest, swings
+        beginning = family(np.zeros(1, np.int64), np.zeros(1))
+        self.rtol, self.chatters = beginning.searching_rtol(rtol), beginning.chatters
         self.first, self.longest, self.smooth = (
             first or pace * settings.first_branch_step,
             pace * settings.longest_branch_step,
@@ -140,16 +142,6 @@ class Tracer:
             times, place = times * np.exp(target[2] - near.time), target[:1]
         return self._closed(begin, times, place, target[None], normal, near.jacobians)[0]
 
-    @cached_property
-    def beginning(self) -> Ensemble:
-        """Return the stage at the beginning of the line."""
-        return self.family(np.zeros(1, np.int64), np.zeros(1))
-
-    @property
-    def chatters(self) -> bool:
-        """Tell whether a limiter of the stages on the line chatters, so that multipliers scatter."""
-        return self.beginning.chatters
-
     def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
         """Find cycles on parallel planes at once, from a cycle `near` them all.
 
@@ -180,15 +172,12 @@ class Tracer:
             """Return the stages at `places`, all on the line that is followed."""
             return self.family(np.zeros(len(places), np.int64), places)
 
-        border, rtol = (
-            Border(np.broadcast_to(normal, targets.shape), targets @ normal),
-            self.beginning.searching_rtol(self.rtol),
-        )
+        border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
         orbits, places, jacobians = close_along(
-            family, states, times, places, border, self.sign, rtol, self.swings, jacobians
+            family, states, times, places, border, self.sign, self.rtol, self.swings, jacobians
         )
         stages = self.family(np.zeros(len(places), np.int64), places)
-        cycles = described(stages, orbits, rtol)
+        cycles = described(stages, orbits, self.rtol)
         usable = orbits.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
         certain = np.all(np.isfinite(jacobians), axis=(1, 2))
         points: list[Point | None] = [None] * len(places)
