@@ -120,7 +120,7 @@ def _narrowed(draws: Draws) -> str:
 def _sentence(name: str, draws: Draws) -> str:
     """Say how probable hunting is, with its amplitude and period, and which key matters most.
 
-    `name` is the case: "given", "locked" or "free". For "given", the edge of hunting is added.
+    `name` is the case: "given", "locked" or "free". For the stage as given, the edge of hunting is added.
     """
     fates = draws.fates[name]
     open_ones = {word: fates.counts[word] for word in UNDECIDED if fates.counts[word]}
@@ -131,14 +131,15 @@ def _sentence(name: str, draws: Draws) -> str:
     )
     hunting, attracted = (share_with_interval(fates.share(words)) for words in (("hunts",), ATTRACTED))
     none = "none hunts, and none has a cycle that attracts (fewer than {} % of all, with 95 % confidence)"
-    probable = fates.share(ATTRACTED)
+    probable, variants = fates.share(ATTRACTED), draws.stage.variants()
+    edge = _edge(draws) if variants[name] == variants["given"] else ""
     sentences += [
         f"what {draws.sample.count} draws do is not certain."
         if sum(open_ones.values()) == draws.sample.count
         else f"of {draws.sample.count} draws, hunts with a probability of {hunting}, has a cycle that attracts with "
-        f"{attracted}{_swings(fates)}{_edge(draws) if name == 'given' else ''}."
+        f"{attracted}{_swings(fates)}{edge}."
         if probable.probability
-        else f"of {draws.sample.count} draws, {none.format(percentage(probable.high))}."
+        else f"of {draws.sample.count} draws, {none.format(percentage(probable.high))}{edge}."
     ]
     if open_ones:
         counts = listed([f"{count} {OPEN[word]}" for word, count in open_ones.items()], "and")
