@@ -165,17 +165,17 @@ def test_ranges_of_what_hunts_are_told_first_with_what_narrows_them() -> None:
     assert (document["amplitude_m"], document["edge_hz"]) == ([2.5e-4, 3e-4], [17.0, 18.5])
 
 
-@pytest.mark.parametrize("given", ["locked", "free"])
-def test_the_edge_stands_with_the_joint_as_given(rig: Stage, given: str) -> None:
+@pytest.mark.parametrize("case", ["locked", "free"])
+def test_the_edge_stands_with_the_joint_as_given(rig: Stage, case: str) -> None:
     """The drawn stages hunt with the joint locked, and do not with it free."""
-    stage = rig.replace({"joint.locked": given == "locked"})
+    stage = rig.replace({"joint.locked": case == "locked"})
     words = {"locked": "hunts", "free": "settles"}
     judged = {name: Fates(np.array([word] * 9, dtype=object), np.zeros(9, bool)) for name, word in words.items()}
     sample = Sample({"friction.coulomb": np.linspace(0.5, 1.5, 9)}, 9, 0, {})
     edges = DrawnEdges(np.array([9.0]), np.array([10.0]))
-    shown = Draws(stage, sample, 0, {**judged, "given": judged[given]}, 9, edges)
-    told = [line for line in draws_sentences(shown) if "9.00 to 10.0 Hz" in line]
-    assert [line.partition(",")[0].lower() for line in told] == [f"{given} (as given)"]
+    shown = Draws(stage, sample, 0, {**judged, "given": judged[case]}, 9, edges)
+    lines = [line for line in draws_sentences(shown) if "9.00 to 10.0 Hz" in line]
+    assert [line.partition(",")[0].lower() for line in lines] == [f"{case} (as given)"]
 
 
 def test_the_edge_of_every_draw_is_that_of_its_own_stage(rig: Stage) -> None:
