@@ -19,6 +19,7 @@ from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.common import record
 from friso.identification.readings.course import external
+from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
 from friso.identification.sources import recognised
 from friso.identification.stage_file import identified_stage
@@ -196,6 +197,27 @@ def test_constant_speed_without_a_stribeck_curve_gives_a_stage(speeds: list[floa
         matrix, keys = identification.correlations.matrix, identification.correlations.keys
         assert matrix[keys.index(COULOMB), keys.index(STATIC)] == pytest.approx(1)
         assert matrix[keys.index(COULOMB), keys.index("friction.viscous")] < -0.3
+
+
+def test_settling_after_steps_of_force_is_not_friction() -> None:
+    """Speeds that still approach their end are read with the inertia of the mass that the log itself shows.
+
+    The axis of 8 kg has Coulomb friction of 10 N and viscous friction of 80 N s/m, hence a time constant of 0.1 s.
+    """
+    rng = np.random.default_rng(2)
+    force = np.repeat([0, 15, 0, -40, 0, 25, 0, -15, 0, 40, 0, -25, 0, 30, 0, -30, 0.0], 1000)
+    velocity = np.zeros(force.size)
+    for k in range(force.size - 1):
+        friction = 80 * velocity[k] + 10 * np.sign(velocity[k] or force[k])
+        after = velocity[k] + STEP * (force[k] - friction) / 8
+        velocity[k + 1] = 0.0 if velocity[k] * after < 0 or (abs(force[k]) < 10 and not velocity[k]) else after
+    position = np.cumsum(velocity) * STEP + 1e-7 * rng.standard_normal(force.size)
+    log = record("steps", STEP, position=position, force=force + 0.02 * rng.standard_normal(force.size))
+    both = friction_velocity(log).both
+    for estimate, value in ((both.coulomb, 10.0), (both.viscous, 80.0)):
+        assert estimate.low <= value <= estimate.high
+        assert (estimate.high - estimate.low) / value < 0.02
+    assert both.curve is None
 
 
 # which experiment a log is

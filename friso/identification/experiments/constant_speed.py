@@ -30,11 +30,11 @@ class FrictionAtSpeeds:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
-    """Analyse a log of constant speeds, with the assumed masses and the loop's crossover."""
+    """Analyse a log of constant speeds, with the loop's crossover, and with the masses if they are known."""
     (log,) = logs
     assert isinstance(log, Log)
     mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
-    friction = friction_velocity(log, mass, _stated_exponent(prior))
+    friction = friction_velocity(log, mass or None, _stated_exponent(prior))
     return FrictionAtSpeeds(friction, friction_position(log, mass, crossover))
 
 

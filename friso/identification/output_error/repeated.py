@@ -14,7 +14,7 @@ from friso.identification.output_error.parameters import BRISTLES
 from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.settings import OutputErrorSettings
-from friso.identification.readings.common import digit_of
+from friso.identification.readings.common import digit_of, noise_of
 from friso.identification.settings import IdentificationSettings
 from friso.identification.spread import CONFIDENCE, binned
 from friso.intervals import COVERAGE
@@ -78,13 +78,12 @@ def _simulated_logs(
     settings = OutputErrorSettings.current()
     problem = once.problem
     record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
-    measured = log["position"][part]
-    blur, digit = blur_of(measured, problem.inputs.reference), digit_of(log["force"][part])
+    digit = digit_of(log["force"][part])
     rounded, speed = 0 < noise <= digit / np.sqrt(12), np.abs(problem.inputs.velocity)
     for number in range(settings.repetitions_of_a_fit):
         progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
-        signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
+        signals["position"][part] = record.position + _blur(log, part, problem, rng)
         force = problem.inputs.force + record.force
         rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
         signals["force"][part] = force + rough
@@ -92,6 +91,17 @@ def _simulated_logs(
         level = len(like.sharper) - len(problem.sharper)
         like = like.held_to(level - 1) if level else like
         yield replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
+
+
+def _blur(log: Log, part: slice, problem: Problem, rng: np.random.Generator) -> np.ndarray:
+    """Sample errors of the logged position [m], (n,), in `part` of a log.
+
+    They are white; those of a position that was integrated from a velocity are the integral of the velocity's.
+    """
+    white = rng.standard_normal(part.stop - part.start)
+    if log.is_integrated:
+        return np.cumsum(noise_of(log["velocity"][part]) * white) * log.sample_time
+    return blur_of(log["position"][part], problem.inputs.reference) * white
 
 
 def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random.Generator) -> np.ndarray:

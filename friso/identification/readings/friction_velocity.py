@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import Mean, by_direction, by_t, t_value
 from friso.identification.readings.passes import Pass, on_common_places, passes, places_of
@@ -59,17 +61,19 @@ class FrictionVelocity:
     warnings: tuple[str, ...]
 
 
-def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
+def friction_velocity(log: Log, mass: float | None = None, exponent: float | None = None) -> FrictionVelocity:
     """Read friction over speed from stretches of constant velocity, over their common places.
 
     Stretches stay whole if their common places are too few. Inertia, `mass` [kg] times remaining acceleration, is
-    subtracted. The Stribeck curve has the `exponent` of the stage unless the forces refute it; otherwise all intervals
-    allow for every exponent that the forces permit. Quantities that the speeds cannot show are unknown, with the
-    reason. Raises InputError for missing channels.
+    subtracted; a mass that is not given is read from the log, and its error counts. The Stribeck curve has the
+    `exponent` of the stage unless the forces refute it; otherwise all intervals allow for every exponent that the
+    forces permit. Quantities that the speeds cannot show are unknown, with the reason. Raises InputError for missing
+    channels.
     """
     stretches = passes(log)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
-    velocities, forces, errors, swings = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 4).T
+    inertia = (mass, 0.0) if mass is not None else _mass(log)
+    velocities, forces, errors, swings = np.array([_row(stretch, *inertia) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
@@ -90,16 +94,28 @@ def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None
     return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, tuple(warnings))
 
 
-def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
+def _mass(log: Log) -> tuple[float, float]:
+    """Read the moving mass [kg] off a log by the inverse model, with the half-width of its interval [kg].
+
+    Both are 0 for a log that the inverse model cannot read: too short, or hardly moving.
+    """
+    try:
+        mass = inverse_model(log).estimate("mass")
+    except InputError:
+        return 0.0, 0.0
+    return mass.value, (mass.high - mass.low) / 2
+
+
+def _row(stretch: Pass, mass: float, error: float) -> tuple[float, float, float, float]:
     """Return velocity [m/s], friction [N], its half-width [N], and relative swing of a pass.
 
-    Inertia, `mass` [kg] times the remaining acceleration, is subtracted. The relative swing is the standard deviation
-    of the velocity over the velocity.
+    Inertia, `mass` [kg] times the remaining acceleration, is subtracted, and counts with the `error` [kg] of the mass.
+    The relative swing is the standard deviation of the velocity over the velocity.
     """
     return (
         stretch.velocity,
         stretch.force.value - mass * stretch.acceleration,
-        t_value(stretch.force.freedom) * stretch.force.error,
+        float(np.hypot(t_value(stretch.force.freedom) * stretch.force.error, error * stretch.acceleration)),
         stretch.swing / abs(stretch.velocity),
     )
 

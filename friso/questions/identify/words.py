@@ -34,7 +34,7 @@ LEFT = "not identified"
 
 NO_STAGE = (
     "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
-    "identified values replace those in it."
+    "identified values replace those in it. A log that often speeds up shows a mass too: try --as moves."
 )
 
 NO_NEWTONS = "No stage file is written: its keys need the force in {}."
