@@ -1,6 +1,7 @@
 """Bristles from small motion before sliding: against logs of known bristles, and against the rig's machines."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.at_bearing import Between, StructureMode, machine_between
 from friso.identification.readings.common import deflections, jackknife, record
+from friso.identification.sources import recognised
 from friso.progress import silent
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
@@ -71,6 +73,15 @@ def test_bristles_bend_as_the_differential_equation_says(seed: int, bending: flo
         z.append(run.y[0, -1])
     assert deflections(moves[1:], np.full(7, 1 / bending)) == pytest.approx(np.array(z), rel=1e-6, abs=1e-8 / bending)
     assert np.all(np.abs(z) <= 1 / bending)
+
+
+def test_motion_is_moves_only_if_the_bearing_slides() -> None:
+    """Motion of 5 um against bristles of 30 um is not that of sliding; against bristles of 0.1 um it is."""
+    before, beyond = (shaken(1e-6, bending, top=5) for bending in (STIFFNESS / STATIC, 1e7))
+    moving = {**before.signals, "reference": before["position"]}
+    assert recognised(before, Path("small.csv"))[0] == "presliding"
+    assert recognised(replace(before, signals=moving), Path("small.csv"))[0] == "presliding"
+    assert recognised(beyond, Path("small.csv"))[0] == "moves"
 
 
 def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:

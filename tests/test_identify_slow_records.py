@@ -17,6 +17,7 @@ from friso.identification.inverse_model import inverse_model
 from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
+from friso.identification.output_error.to_keys import _range
 from friso.identification.quality import Quality, quality_of
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
@@ -55,6 +56,36 @@ def test_friction_at_slow_speeds_alone_is_no_coulomb_friction(stribeck: Estimate
     kept = shown((MASSES, COULOMB, stribeck), top)
     assert (COULOMB.name in kept) == left
     assert "masses.cart" in kept
+
+
+def test_all_friction_at_the_highest_slow_speed_may_be_dry() -> None:
+    """A Stribeck effect that still acts may have passed for viscous friction, and static friction exceeds Coulomb's."""
+    viscous = Estimate.normal("friction.viscous", "N*s/m", 4e3, 100.0, "drawn")
+    static = Estimate.unknown("friction.static", "N", "drawn", "not covered", 7.8, 16.0)
+    case = case_of((MASSES, COULOMB, viscous, static, UNKNOWN), velocity=np.array([1e-3]))
+    for finding in slow_motion.find(case):
+        case = case.with_answers(finding)
+    coulomb, rest, static = case.estimates[1:4]
+    assert {one.determined for one in (coulomb, rest, static)} == {False}
+    assert coulomb.high == pytest.approx(COULOMB.high + viscous.high * 1e-3)
+    assert (static.low, static.high) == pytest.approx((coulomb.low, 4 * coulomb.high))
+
+
+@pytest.mark.parametrize("bounded", [{1}, set()])
+def test_a_search_about_a_first_value_bounds_nothing(bounded: set[int]) -> None:
+    """The range of a mass is made from its start; that of static friction follows from a bounded Coulomb friction."""
+    parameters = [
+        FitParameter(MASS, "kg", 3.0, 0.6, 15.0, core=True),
+        FitParameter("friction.coulomb", "N", 8.0, 0.4, 40.0, core=True),
+        FitParameter(RATIO, "", 1.0, 1.0, 4.0, logarithmic=False, core=False),
+    ]
+    problem = SimpleNamespace(parameters=parameters)
+    inner = np.array([np.log(3.0), np.log(8.0), 1.0])
+    fit: Any = SimpleNamespace(
+        problem=problem, inner=inner, free=(0, 1), covariance=np.zeros((2, 2)), bounded=frozenset(bounded)
+    )
+    assert _range(fit, MASS) == (-np.inf, np.inf)
+    assert _range(fit, RATIO) == pytest.approx((8.0, 32.0) if bounded else (-np.inf, np.inf))
 
 
 @pytest.mark.parametrize(("share", "off"), [(0.01, MASSES.half_width), (0.9, 0.81 * 3.0), (1.1, None)])

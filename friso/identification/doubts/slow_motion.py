@@ -5,12 +5,15 @@ Friction at higher speeds is then open.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
+from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt, refused
+from friso.identification.estimate import Estimate
 from friso.identification.output_error.parameters import stribeck_up_to
+from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.settings import DoubtSettings
 
 SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
@@ -26,14 +29,34 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """
     if "friction.stribeck_velocity" not in case.flat:
         return
-    stribeck, level = (case.determined.get(f"friction.{name}") for name in ("stribeck_velocity", "coulomb"))
+    stribeck = case.determined.get("friction.stribeck_velocity")
     enough = DoubtSettings.current().stribeck_velocities_of_sliding
     top = float(np.abs(case.velocity).max())
     if top >= (enough * stribeck.high if stribeck else stribeck_up_to(case.flat)):
         return
-    dry = f": {level.value:.3g} {case.unit} is dry friction there" if level else ""
-    why = f"the log moves at {top * 1e3:.3g} mm/s at most, where the Stribeck effect may still act{dry}"
-    yield RaisedDoubt(size=top, unit="m/s", refuses=dict.fromkeys(SLIDING, why))
+    why = f"the log moves at {top * 1e3:.3g} mm/s at most, where the Stribeck effect may still act"
+    coulomb, viscous = (case.determined.get(key) for key in SLIDING[:2])
+    if coulomb and viscous:
+        why = f"{why}: {coulomb.value + viscous.value * top:.3g} {case.unit} is friction there"
+    answers = _bounded(case.estimates, coulomb, viscous.high * top if viscous else np.inf, why) if coulomb else {}
+    refuses = {key: why for key in SLIDING if key not in answers}
+    yield RaisedDoubt(size=top, unit="m/s", answers=answers, refuses=refuses)
+
+
+def _bounded(estimates: Sequence[Estimate], coulomb: Estimate, rise: float, why: str) -> dict[str, Estimate]:
+    """Return Coulomb friction without a value, `why`, and static friction if it has none, each with its range.
+
+    `rise` [N] is by how much friction exceeds the fitted Coulomb friction at the highest speed: at most all of it is
+    Coulomb friction, since a Stribeck effect that still acts may pass for viscous friction.
+    """
+    (bounded,) = refused([coulomb], {coulomb.name: why}).values()
+    bounded = replace(bounded, high=bounded.high + max(rise, 0.0))
+    highest = OutputErrorSettings.current().highest_friction_ratio * bounded.high
+    static = [one for one in estimates if one.name == "friction.static" and not one.determined]
+    return {
+        coulomb.name: bounded,
+        **{one.name: replace(one, low=min(one.low, bounded.low), high=max(one.high, highest)) for one in static},
+    }
 
 
 DOUBT = Doubt(

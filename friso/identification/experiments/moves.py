@@ -15,8 +15,6 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
 from friso.identification.readings.course import Course
-from friso.identification.readings.friction_velocity import distinct
-from friso.identification.readings.settings import ReadingSettings
 from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
@@ -44,26 +42,8 @@ ALIKE = (
 
 
 def _claims(course: Course) -> str | None:
-    """Return why a log holds moves, or None.
-
-    The reference of such a log moves. Otherwise it has no series of constant speeds or force ramps, and its driving
-    signal must meet one of two conditions. It does not repeat, and the log has no reference; or it repeats with rests
-    in between, or with few frequencies, as sines do.
-    """
-    experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
-    if course.reference_moves:
-        return "its reference moves"
-    if distinct(course.speeds) >= reading_settings.speeds_of_a_line or course.ramps >= reading_settings.fewest_ramps:
-        return None
-    repetition = course.repetition
-    if repetition is None:
-        standing = "reference" in course.log
-        return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
-    if repetition.rests > experiment_settings.rests_of_moves:
-        return f"{course.repeats}, but the position rests in between"
-    if repetition.harmonics < experiment_settings.harmonics_of_an_excitation:
-        return f"{course.repeats}, but contains few frequencies"
-    return None
+    """Return why a log holds moves, or None if the bearing never slides in it."""
+    return None if course.sticks else course.moves
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:

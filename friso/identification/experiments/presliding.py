@@ -39,6 +39,7 @@ from friso.identification.readings.common import (
     jackknife,
     solve_normal_equations,
 )
+from friso.identification.readings.course import Course
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_keys import shared_masses
@@ -307,6 +308,19 @@ def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated
     return certain, result.correlation[np.ix_(rows, rows)]
 
 
+def _claims(course: Course) -> str | None:
+    """Return why a log holds motion before sliding, or None: moves in which the bearing never slides."""
+    if course.moves is None or not course.sticks:
+        return None
+    return "the position follows the force, within what bristles bend: the bearing never slides"
+
+
 KIND = ExperimentKind[Presliding](
-    _analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"), foreign=("force",), per_unit=True
+    _analyse,
+    _estimates,
+    _correlated,
+    after=("constant-speed", "frequency", "moves"),
+    claims=_claims,
+    foreign=("force",),
+    per_unit=True,
 )

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
+from friso.axis import axis_of
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
@@ -209,7 +210,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
-        return covered.shows_length(min(bends(problem.flat)[1], float(np.ptp(problem.inputs.reference))))
+        return covered.shows_length(min(bends(axis_of(problem.flat))[1], float(np.ptp(problem.inputs.reference))))
     return parameter.unit != "" or name == SHARE
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.axis import LINEAR, axis_of
+from friso.axis import LINEAR, AxisKind, axis_of
 from friso.errors import InputError
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.stage.tables import friction_law, friction_laws
@@ -49,13 +49,13 @@ class FitParameter:
         return np.exp(inner) if self.logarithmic else inner
 
 
-def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
+def bends(axis: AxisKind) -> tuple[float, float]:
     """Return the shortest and longest bend of bristles before sliding in a fit [m].
 
     On a rotary axis they are angles [rad], which follow from the largest and smallest bearing radii.
     """
     settings = OutputErrorSettings.current()
-    if axis_of(flat) == LINEAR:
+    if axis == LINEAR:
         return settings.shortest_bristle_bend, settings.longest_bristle_bend
     smallest, largest = settings.bearing_radii
     return settings.shortest_bristle_bend / largest, settings.longest_bristle_bend / smallest
@@ -135,7 +135,7 @@ def _friction(
             _exponent(flat["friction.stribeck_exponent"]),
         ]
     if "friction.bristle_stiffness" in flat:
-        shortest, longest = bends(flat)
+        shortest, longest = bends(axis_of(flat))
         softest, stiffest = coulomb / min(longest, travel / 10), coulomb / shortest
         parameters.append(_slow("friction.bristle_stiffness", "N/m", flat, softest, stiffest))
     if "friction.bristle_damping" in flat:

@@ -10,7 +10,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import IdentifiableFit, why_not_shown
-from friso.identification.output_error.parameters import MASS, RATIO, SHARE, STRIBECK, keys_of
+from friso.identification.output_error.parameters import BRISTLES, MASS, RATIO, SHARE, STRIBECK, keys_of
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.settings import ReadingSettings
@@ -142,13 +142,17 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
 
     `owner` is the parameter's name. The range is the one that the parameter has in the fit, for any bearing. For the
     ratio of static to Coulomb friction it is a range of static friction. The fitted value is no bound, because it
-    compensates for what the model lacks.
+    compensates for what the model lacks. Nothing bounds a parameter that every motion shows, if this record does not;
+    nor static friction and bristles without Coulomb friction, from which their ranges follow.
     """
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
-    parameter = parameters[owner]
+    parameter, number_of = parameters[owner], {name: number for number, name in enumerate(parameters)}
+    of_coulomb = owner in (RATIO, *BRISTLES) and number_of["friction.coulomb"] not in fit.bounded
+    if parameter.core or of_coulomb:
+        return -np.inf, np.inf
     if owner == RATIO:
         level = parameters["friction.coulomb"]
-        number = list(parameters).index(level.name)
+        number = number_of[level.name]
         off = COVERAGE * float(np.sqrt(fit.covariance[fit.free.index(number), fit.free.index(number)]))
         ends = level.inner(level.low), level.inner(level.high)
         least, most = (float(level.outer(np.clip(fit.inner[number] + end, *ends))) for end in (-off, off))

@@ -10,11 +10,14 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
+from friso.identification.output_error.parameters import bends
 from friso.identification.readings.common import runs
+from friso.identification.readings.friction_velocity import distinct
 from friso.identification.readings.passes import Pass, passes
 from friso.identification.readings.ramps import force_ramps
 from friso.identification.readings.settings import ReadingSettings
 from friso.identification.response.period import find_periods
+from friso.identification.settings import ExperimentSettings
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,42 @@ class Course:
         period = periods.cut(self.log[self.signal][part]).mean(axis=0)
         moved = self.log["position"][part][periods.start : periods.stop]
         return Repetition(periods.samples, _harmonics(period), _turns(period), _rest(moved, periods.samples))
+
+    @cached_property
+    def moves(self) -> str | None:
+        """Return why a log holds moves, large or small; None for an experiment that drives the body in its own way.
+
+        The reference of such a log moves. Otherwise it has no series of constant speeds or
+        force ramps, and its driving signal must meet one of two conditions. It does not repeat, and the log has no
+        reference; or it repeats with rests in between, or with few frequencies, as sines do.
+        """
+        if self.reference_moves:
+            return "its reference moves"
+        experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
+        if distinct(self.speeds) >= reading_settings.speeds_of_a_line or self.ramps >= reading_settings.fewest_ramps:
+            return None
+        repetition = self.repetition
+        if repetition is None:
+            standing = "reference" in self.log
+            return None if standing else f"the {self.signal} does not repeat, and there is no reference that moves"
+        if repetition.rests > experiment_settings.rests_of_moves:
+            return f"{self.repeats}, but the position rests in between"
+        if repetition.harmonics < experiment_settings.harmonics_of_an_excitation:
+            return f"{self.repeats}, but contains few frequencies"
+        return None
+
+    @cached_property
+    def sticks(self) -> bool:
+        """Tell whether the body moves within what bristles bend, and its place explains most of the force.
+
+        The force of a body that slides has the sign of its velocity, and does not follow from the place.
+        """
+        part = self.log.longest
+        position, force = self.log["position"][part], self.log["force"][part]
+        if not (0 < np.ptp(position) < 2 * bends(self.log.axis)[1] and np.ptp(force) > 0):
+            return False
+        correlation = float(np.corrcoef(position, force)[0, 1])
+        return correlation > 0 and correlation**2 > 0.5
 
     @cached_property
     def speeds(self) -> np.ndarray:

@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
-from friso.identification.method import Prediction, around, axis_of_all, check_predictions
+from friso.identification.method import Prediction, around, axis_of_all, check_predictions, nothing_learnt
 from friso.identification.sources import LogFile, per_unit_of_force, read_all, read_usable
 from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.interface.answer import Answer, AnswerTable, question
@@ -43,6 +43,7 @@ from friso.stage.stage import axis_written, changed
 
 if TYPE_CHECKING:
     from friso.identification.estimate import Estimate
+    from friso.identification.method import Identification
     from friso.questions.check.question import CheckAnswer
     from friso.shown.drawing.figure import Figure
     from friso.shown.files import Files
@@ -172,7 +173,7 @@ def identify(
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
-        Called with what was said of the channels of each file, to keep it, where the logs were identified.
+        Called with what was said of the channels of each file, to keep it, if the logs showed anything.
 
     Returns
     -------
@@ -229,14 +230,24 @@ def identify(
     left_out = [f"left out: {_in_one_line(error)}" for error in unusable]
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
-    if keep is not None and not result.failed:
-        keep({file.path: file.mapping for file in inputs})
+    if keep is not None and not result.failed and not nothing_learnt(result.estimates, False):
+        keep({file.path: _worth_keeping(file.mapping, result) for file in inputs})
     checked = None
     if check and result.stage is not None:
         from friso.questions.check.question import checked_stage
 
         checked = checked_stage(result.stage, result.correlations, progress=progress)
     return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind, checked=checked)
+
+
+def _worth_keeping(mapping: Mapping, result: Identification) -> Mapping:
+    """Return what the user said of a log's channels, without a kind of experiment that determined no key."""
+    useless = [
+        experiment.kind
+        for experiment in result.experiments
+        if experiment.estimates and not any(estimate.determined for estimate in experiment.estimates)
+    ]
+    return replace(mapping, experiment=None) if mapping.experiment in useless else mapping
 
 
 def _in_one_line(error: InputError) -> str:

@@ -34,8 +34,11 @@ LEFT = "not identified"
 
 NO_STAGE = (
     "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
-    "identified values replace those in it. A log that often speeds up shows a mass too: try --as moves."
+    "identified values replace those in it."
 )
+
+SPEEDS_UP = "If this log often speeds up, it shows a whole machine as moves (--as moves)."
+"""Sentence for logs of constant speeds without a stage."""
 
 NO_NEWTONS = "No stage file is written: its keys need the force in {}."
 """Sentence for moves whose force is in another unit than newtons."""
@@ -116,7 +119,10 @@ def _why_no_stage(identification: Identification) -> str:
         return f'{NO_NEWTONS.format(newtons)} --scale force="NUMBER {newtons}/{shown.force}" tells it.'
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
     around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
-    return NO_NEWTONS.format(unit_shown("N")) if around and any("force" in log.units for log in logs) else NO_STAGE
+    if around and any("force" in log.units for log in logs):
+        return NO_NEWTONS.format(unit_shown("N"))
+    speeds = {experiment.kind for experiment in identification.experiments} == {"constant-speed"}
+    return f"{NO_STAGE} {SPEEDS_UP}" if speeds else NO_STAGE
 
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
