@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from friso.identification.doubt import KeyCase
-from friso.identification.doubts import lost_inertia, slow_motion
+from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
@@ -86,6 +86,24 @@ def test_a_search_about_a_first_value_bounds_nothing(bounded: set[int]) -> None:
     )
     assert _range(fit, MASS) == (-np.inf, np.inf)
     assert _range(fit, RATIO) == pytest.approx((8.0, 32.0) if bounded else (-np.inf, np.inf))
+
+
+@pytest.mark.parametrize(("beyond", "left"), [((1.1, 1.4, 1.5, 1.6), True), ((1.1, 1.4, 0.9, 1.6), False)])
+def test_stiffer_bristles_beside_errors_of_the_position(
+    beyond: tuple[float, ...], left: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bristles are refused if stiffer ones leave no more of the record than of a simulated log of their own machine."""
+    stiffness = Estimate.normal("friction.bristle_stiffness", "N/m", 3e5, 2e4, "drawn")
+    problem = SimpleNamespace(names=(stiffness.name,), closed=False)
+    fit: Any = SimpleNamespace(problem=problem, inner=np.array([np.log(3e5)]), free=(0,), slopes=None)
+    refitted = SimpleNamespace(inner=np.zeros((4, 1)), cost=2.0 * np.array(beyond))
+    own = SimpleNamespace(residuals=lambda inner: np.full((1, 100), 2**0.5))
+    monkeypatch.setattr(stiffer_bristles, "refine_fit", lambda *arguments, **named: refitted)
+    monkeypatch.setattr(stiffer_bristles, "simulated_log", lambda *arguments: own)
+    case = case_of((stiffness,), fit=fit, inverse=SimpleNamespace(bandwidth=20.0))
+    for finding in stiffer_bristles.find(case):
+        case = case.with_answers(finding)
+    assert (stiffness.name in case.determined) == left
 
 
 @pytest.mark.parametrize(("share", "off"), [(0.01, MASSES.half_width), (0.9, 0.81 * 3.0), (1.1, None)])

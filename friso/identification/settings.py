@@ -129,6 +129,9 @@ class DoubtSettings(Settings):
     """Number of pitches tried per additional period along the travel. Between two of them the phase slips by a quarter
     turn."""
 
+    stiffer_bristles: tuple[float, ...] = setting((4.0, 8.0, 16.0), "")
+    """Stiffnesses of bristles that are tried beside the fitted one, relative to it."""
+
     plays_tried: tuple[float, ...] = setting((8e-6, 1e-3), "m")
     """Smallest and largest width of play that is tried. Narrower play passes within a few samples; wider play is
     obvious."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -33,18 +32,13 @@ def as_far_off_as_repeated(
     If the residual of the log exceeds the residuals of the simulated logs, errors are scaled up by the ratio.
     """
     settings = OutputErrorSettings.current()
-    free = np.isin(np.arange(len(once.inner)), once.free)
-    again = [
-        refine_fit(
-            [problem],
-            once.inner[None],
-            free[None],
-            settings.iterations_of_a_repetition,
-            settings.cost_share_of_refinement,
-            slopes=once.slopes,
-        )
-        for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
-    ]
+    free, rng = np.isin(np.arange(len(once.inner)), once.free), np.random.default_rng(settings.seed_of_repetitions)
+    again = []
+    for number in range(settings.repetitions_of_a_fit):
+        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
+        like = simulated_log(once.problem, once.inner, log, part, bandwidth, noise, rng)
+        allowed = settings.iterations_of_a_repetition, settings.cost_share_of_refinement
+        again.append(refine_fit([like], once.inner[None], free[None], *allowed, slopes=once.slopes))
     off = np.sqrt(np.mean([(fit.inner[0] - once.inner)[free] ** 2 for fit in again], axis=0))
     off = off * float(student.ppf(CONFIDENCE, settings.repetitions_of_a_fit)) / COVERAGE
     usual = float(np.mean([fit.cost[0] for fit in again]))
@@ -67,30 +61,33 @@ def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
     return fit.with_covariance(covariance)
 
 
-def _simulated_logs(
-    once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
-) -> Iterator[Problem]:
-    """Yield problems with simulated logs of the fitted machine.
+def simulated_log(
+    problem: Problem,
+    inner: np.ndarray,
+    log: Log,
+    part: slice,
+    bandwidth: float,
+    noise: float,
+    rng: np.random.Generator,
+) -> Problem:
+    """Return the problem of fitting a simulated log of a machine with the fitted numbers `inner`.
 
-    A simulated log has the logged force plus the guiding controller's, and the stage's own position, both with the
-    log's noise. A force whose resolution is coarser than its noise has errors of rounding instead.
+    The simulated log has the logged force plus the guiding controller's, and the stage's own position, both with the
+    errors of the logged ones in `part` of the log. `noise` [N] is the force's; a force whose resolution is coarser than
+    its noise has errors of rounding instead. `bandwidth` [Hz] is the motion's.
     """
-    settings = OutputErrorSettings.current()
-    problem = once.problem
-    record, rng = problem.record(once.inner), np.random.default_rng(settings.seed_of_repetitions)
+    record, speed = problem.record(inner), np.abs(problem.inputs.velocity)
     digit = digit_of(log["force"][part])
-    rounded, speed = 0 < noise <= digit / np.sqrt(12), np.abs(problem.inputs.velocity)
-    for number in range(settings.repetitions_of_a_fit):
-        progress(number, settings.repetitions_of_a_fit, "moves: the same fit of simulated logs")
-        signals = {role: values.copy() for role, values in log.signals.items()}
-        signals["position"][part] = record.position + _blur(log, part, problem, rng)
-        force = problem.inputs.force + record.force
-        rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
-        signals["force"][part] = force + rough
-        like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
-        level = len(like.sharper) - len(problem.sharper)
-        like = like.held_to(level - 1) if level else like
-        yield replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
+    signals = {role: values.copy() for role, values in log.signals.items()}
+    signals["position"][part] = record.position + _blur(log, part, problem, rng)
+    force = problem.inputs.force + record.force
+    rounded = 0 < noise <= digit / np.sqrt(12)
+    rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
+    signals["force"][part] = force + rough
+    like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
+    level = len(like.sharper) - len(problem.sharper)
+    like = like.held_to(level - 1) if level else like
+    return replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
 
 
 def _blur(log: Log, part: slice, problem: Problem, rng: np.random.Generator) -> np.ndarray:
