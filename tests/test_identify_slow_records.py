@@ -13,7 +13,7 @@ from friso.identification.doubt import KeyCase
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import inverse_model
+from friso.identification.inverse_model import bandwidth_of, inverse_model
 from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -158,7 +158,7 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     position = 0.05 * np.sin(2 * np.pi * 0.5 * time)
     force = 11.0 * np.sign(np.cos(2 * np.pi * 0.5 * time)) + 20.0 * np.sin(2 * np.pi * 3.1 * time)
     log = record("axis", 1e-3, position=position, force=force)
-    inverse = inverse_model(log)
+    inverse = inverse_model(log, bandwidth_of(log))
     stage = made_up(log, inverse).flat()
     problem = SimpleNamespace(noise_left=lambda noise: noise, closed=False, counted=np.ones(len(time)))
     fit: Any = SimpleNamespace(left=left, problem=problem, stage=stage, explains=lambda noise: False)
@@ -166,6 +166,21 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     assert quality.failed == failed
     assert not quality.rejected
     assert bool(quality.without) == doubted
+
+
+def test_vibration_beyond_the_moves_does_not_hide_the_mass() -> None:
+    """A loop that shakes on the steps of its encoder: force and position swing at 40 Hz, but not as a mass does."""
+    time = np.arange(8000) * 1e-3
+    position, swing = 0.05 * np.sin(2 * np.pi * 0.5 * time), 2 * np.pi * 40 * time
+    velocity, acceleration = np.gradient(position, time), np.gradient(np.gradient(position, time), time)
+    force = 8.0 * acceleration + 20.0 * velocity + 4.0 * np.sign(velocity) + 15.0 * np.sin(swing)
+    log = record("shaking", 1e-3, position=position + 4e-5 * np.sin(swing + 2), force=force)
+    whole, within = inverse_model(log, bandwidth_of(log)), inverse_model(log)
+    assert whole.error > 0.5 > 5 * within.error
+    for name, value in (("mass", 8.0), ("viscous", 20.0), ("coulomb", 4.0)):
+        estimate = within.estimate(name)
+        assert estimate.low <= value <= estimate.high
+        assert estimate.half_width < 0.2 * value
 
 
 def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:

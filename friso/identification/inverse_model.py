@@ -23,7 +23,7 @@ from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.readings.common import cart, noise_of, turns_of
-from friso.identification.settings import IdentificationSettings
+from friso.identification.settings import DoubtSettings, IdentificationSettings
 from friso.identification.spread import groups_of, spread_of
 
 METHOD = "least squares on the inverse model"
@@ -163,16 +163,19 @@ def inverse_model(
     """Fit mass, viscous and Coulomb friction and offset to a log with position and force.
 
     With `by_direction`, viscous and Coulomb friction have a value for each direction; the offset is left out, because a
-    difference of the Coulomb frictions looks alike. `bandwidth` [Hz] is the motion's, taken from the log by default.
-    For a stage on a joint, `cart_share` is the fraction of the mass that moves with the measured cart, on which
-    friction acts.
+    difference of the Coulomb frictions looks alike. For a stage on a joint, `cart_share` is the fraction of the mass
+    that moves with the measured cart, on which friction acts.
+
+    `bandwidth` [Hz] is the motion's, taken from the log by default. A log may vibrate beyond its moves, as a loop does
+    on the steps of an encoder: if the model is poor there, smaller bandwidths are tried, and count if it is not poor.
 
     `averaged` is the number of samples over which the log's force is averaged; the columns are averaged alike. `extra`
     columns by name, shape (n,), are fitted as well, and their part is subtracted from the measured force. Raises
     InputError for a log that is too short.
     """
-    settings = IdentificationSettings.current()
-    band = bandwidth or bandwidth_of(log)
+    if bandwidth is None:
+        return _within_its_moves(log, by_direction, cart_share, averaged, extra)
+    settings, band = IdentificationSettings.current(), bandwidth
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
@@ -210,6 +213,24 @@ def inverse_model(
     return InverseModel(
         estimates, numbers, columns[:, :own], covariance, time, force - explained, fitted - explained, band
     )
+
+
+def _within_its_moves(
+    log: Log, by_direction: bool, cart_share: float, averaged: int, extra: Mapping[str, np.ndarray]
+) -> InverseModel:
+    """Fit an inverse model within the bandwidth of a log, or, if it is poor there, within a smaller one."""
+    poor, band = DoubtSettings.current().error_of_a_poor_model, bandwidth_of(log)
+    first = inverse_model(log, band, by_direction, cart_share, averaged, extra)
+    if first.error <= poor:
+        return first
+    for part in IdentificationSettings.current().bandwidths_within_vibration:
+        try:
+            model = inverse_model(log, part * band, by_direction, cart_share, averaged, extra)
+        except InputError:  # too short, or hardly moving
+            return first
+        if model.error <= poor:
+            return model
+    return first
 
 
 def least_squares(columns: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

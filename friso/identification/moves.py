@@ -103,7 +103,8 @@ def identify_moves(
     check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
-    inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
+    inverse = inverse_model(log, bandwidth, False, share)
+    by_direction = inverse_model(log, inverse.bandwidth, True, share)
     tell(log.name, inverse.estimates)
     follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, settings.smoothing_bandwidths * inverse.bandwidth)

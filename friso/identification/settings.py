@@ -262,6 +262,9 @@ class IdentificationSettings(Settings):
     samples_of_an_edge: int = setting(49, "")
     """Number of samples left out at the start of a record, where the filters settle."""
 
+    bandwidths_within_vibration: tuple[float, ...] = setting((0.5, 0.25, 0.125), "")
+    """Fractions of a log's bandwidth that are tried for its moves if it may vibrate beyond them."""
+
     power_share_of_the_motion: float = setting(0.95, "")
     """Fraction of the acceleration's power within the bandwidth. Nearer 1 noise determines it."""
 

@@ -79,7 +79,7 @@ def simulated_log(
     record, speed = problem.record(inner), np.abs(problem.inputs.velocity)
     digit = digit_of(log["force"][part])
     signals = {role: values.copy() for role, values in log.signals.items()}
-    signals["position"][part] = record.position + _blur(log, part, problem, rng)
+    signals["position"][part] = _measured(record.position, log, part, problem, rng)
     force = problem.inputs.force + record.force
     rounded = 0 < noise <= digit / np.sqrt(12)
     rough = _rounding(log["force"][part], speed, digit, rng) if rounded else noise * rng.standard_normal(len(force))
@@ -90,15 +90,19 @@ def simulated_log(
     return replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
 
 
-def _blur(log: Log, part: slice, problem: Problem, rng: np.random.Generator) -> np.ndarray:
-    """Sample errors of the logged position [m], (n,), in `part` of a log.
+def _measured(position: np.ndarray, log: Log, part: slice, problem: Problem, rng: np.random.Generator) -> np.ndarray:
+    """Return simulated positions [m], (n,), as the sensor of a log would measure them.
 
-    They are white; those of a position that was integrated from a velocity are the integral of the velocity's.
+    Digits coarser than the noise round them, as an encoder does. Otherwise errors are white; those of a position that
+    was integrated from a velocity are the integral of the velocity's.
     """
-    white = rng.standard_normal(part.stop - part.start)
+    logged, white = log["position"][part], rng.standard_normal(len(position))
+    digit = digit_of(logged)
     if log.is_integrated:
-        return np.cumsum(noise_of(log["velocity"][part]) * white) * log.sample_time
-    return blur_of(log["position"][part], problem.inputs.reference) * white
+        return position + np.cumsum(noise_of(log["velocity"][part]) * white) * log.sample_time
+    if digit > 0 and noise_of(logged) <= digit / np.sqrt(12):
+        return digit * np.rint(position / digit)
+    return position + blur_of(logged, problem.inputs.reference) * white
 
 
 def _rounding(force: np.ndarray, speed: np.ndarray, digit: float, rng: np.random.Generator) -> np.ndarray:
