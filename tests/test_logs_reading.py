@@ -427,6 +427,29 @@ def test_a_few_lost_samples_are_bridged_and_do_not_count(tmp_path: Path) -> None
     assert without.counted[[700, 1500, 1998]].all()  # how a log begins does not count in a loop anyway
 
 
+def test_many_lost_samples_are_bridged_where_the_stamps_tell_them(tmp_path: Path) -> None:
+    """A tenth of the rows is missing at random; the time stamps of the others are right."""
+    rows = np.flatnonzero(np.random.default_rng(1).random(2000) > 0.1)
+    log = log_of(tmp_path, NAMES, [column[rows] for column in columns()])
+    assert log.sample_time == pytest.approx(1e-3, rel=1e-6)
+    assert log.bridged is not None
+    assert np.count_nonzero(log.bridged) > 150
+    assert log["position"] == pytest.approx(np.interp(log.time, M["time"], M["position"]), abs=1e-6)
+
+
+def test_a_sample_time_against_the_stamps_is_mentioned(tmp_path: Path) -> None:
+    stamped = "the time stamps are 0.001 s apart"
+    assert any(stamped in line for line in log_of(tmp_path, NAMES, columns(), from_options(dt="2 ms")).warnings)
+    assert not any(stamped in line for line in log_of(tmp_path, NAMES, columns(), from_options(dt="1 ms")).warnings)
+
+
+def test_a_log_without_a_force_asks_for_it(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", NAMES[:3], columns()[:3])
+    with pytest.raises(GapsError) as caught:
+        read_log(path, needed=("position", "force"))
+    assert not caught.value.options
+
+
 def test_a_clock_that_begins_anew_is_not_bridged() -> None:
     time = np.r_[0:500, 501.6:1000] * 1e-3
     assert track("position", time, time).segments == [slice(0, 500), slice(500, time.size)]

@@ -48,7 +48,8 @@ def run(question: Question, about: Sequence[Any], options: Keyed[str, Any], show
                 progress=progress,
             )
         except OpenQuestions as error:
-            raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
+            example = _command(error.options) if error.options else ""
+            raise InputError(error.key, error.actual, error.expected, example, error.origin) from None
     speak_of(answer.axis_kind)
     with drawing_beside():
         show(answer, shown, lambda progress: [*target.write(answer.files(), progress), *kept])

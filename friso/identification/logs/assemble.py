@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -117,7 +118,25 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
             )
         tracks[role] = _track(role, choice, time, values, notes)
     notes.read += _clocks(clock, reading)
+    notes.warnings += _contradicted(chosen, reading, notes)
     return tracks
+
+
+def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes) -> list[str]:
+    """Write what time stamps say against a specified sample time; nothing if they agree, or tell no seconds."""
+    specified, clock = reading.mapping.sample_time, chosen.get("time")
+    if specified is None or (clock is not None and not clock.channel.unit):
+        return []
+    stamped = replace(reading, mapping=replace(reading.mapping, sample_time=None))
+    signals = [choice for role, choice in chosen.items() if role != "time"]
+    every = [stamps for choice in signals if (stamps := instants(choice, clock, stamped, notes)) is not None]
+    usual = [float(np.median(np.diff(stamps))) for stamps in every if stamps.size > 1]
+    if not usual or abs(usual[0] / specified - 1) <= LogSettings.current().difference_of_a_contradiction:
+        return []
+    return [
+        f"time: the time stamps are {usual[0]:.4g} s apart, not {specified:.4g} s as specified: a mass follows from "
+        "the square of it"
+    ]
 
 
 def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:

@@ -48,10 +48,6 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
     steps = np.diff(time)
     long = gaps(steps)
-    if long.mean() > settings.share_of_gaps:
-        usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
-        actual = f"time stamps with {percent(long.mean())} of the steps over {usual}"
-        raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = usual_step(steps)
     lost = np.round(steps / period) - 1
     scatter = min(
@@ -60,6 +56,11 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     )
     whole = np.abs(steps / period - 1 - lost) <= scatter  # otherwise the clock was reset
     bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
+    uneven = float((long & ~bridged).mean())
+    if uneven > settings.share_of_gaps:
+        usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
+        actual = f"time stamps with {percent(uneven)} of the steps over {usual}"
+        raise LogError(name, actual, "uniform sampling, or the true sample time", f'--dt "{period * 1e3:.4g} ms"')
     edges = [0, *(np.flatnonzero(long & ~bridged) + 1).tolist(), time.size]
     inserted = np.where(bridged, lost, 0).astype(int)
     parts = [_bridged(time[a:b], values[a:b], inserted[a : b - 1]) for a, b in pairwise(edges)]
