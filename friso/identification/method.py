@@ -95,7 +95,7 @@ def identify(
     estimates, warnings = combined(_every_estimate(experiments))
     doubts = _doubts(experiments)
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
-    if stage is None or nothing_learnt(estimates, failed):
+    if stage is None or nothing_learnt(estimates, failed) or (base is None and not _shows_a_mass(estimates)):
         return Identification(
             None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
         )
@@ -138,6 +138,12 @@ def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
     ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
     none_determined = not any(estimate.determined for estimate in estimates)
     return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))
+
+
+def _shows_a_mass(estimates: Sequence[Estimate]) -> bool:
+    """Tell whether logs determine or bound a mass, without which a stage made up around them describes no machine."""
+    masses = [estimate for estimate in estimates if estimate.name.startswith("masses.")]
+    return any(np.isfinite([mass.low, mass.high]).all() for mass in masses)
 
 
 def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:

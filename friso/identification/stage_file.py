@@ -106,7 +106,7 @@ def origins(
     A key was identified, follows another one (`follows`), was given in the stage file, or was chosen by friso. The last
     applies to the `chosen` keys (None: all that were not identified).
     """
-    sources: dict[str, str] = {}
+    sources = {"axis.kind": "that of the log"} if chosen is None else {}
     for estimate in estimates:
         sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
     sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}

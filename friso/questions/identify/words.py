@@ -33,8 +33,8 @@ LEFT = "not identified"
 """Text in place of a value that the logs do not show."""
 
 NO_STAGE = (
-    "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
-    "identified values replace those in it."
+    "No stage file is written: these logs do not describe a whole machine. Give the rest with --stage; the identified "
+    "values replace those in it."
 )
 
 SPEEDS_UP = "If this log often speeds up, it shows a whole machine as moves (--as moves)."
