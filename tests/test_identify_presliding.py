@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from refusals import Refused, Wording
 from rig_machines import EXAMPLE, built
 from scipy.integrate import solve_ivp
+from scipy.ndimage import gaussian_filter1d
 
 import friso
 from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
@@ -82,6 +83,26 @@ def test_motion_is_moves_only_if_the_bearing_slides() -> None:
     assert recognised(before, Path("small.csv"))[0] == "presliding"
     assert recognised(replace(before, signals=moving), Path("small.csv"))[0] == "presliding"
     assert recognised(beyond, Path("small.csv"))[0] == "moves"
+
+
+def test_a_spring_to_ground_is_no_bristles() -> None:
+    """A force in proportion to 300 um of travel is that of a spring: no bristles of a bearing bend as far."""
+    spring = shaken(6e-5, 1.0, top=5)
+    assert np.ptp(spring["position"]) > 3e-4
+    assert not bristles_from_presliding(spring).stiffness.determined
+    assert recognised(spring, Path("spring.csv"))[0] == "moves"
+
+
+@pytest.mark.parametrize("travel", [2e-5, 2e-4, 5e-4])
+def test_a_body_that_slides_there_and_back_moves(travel: float) -> None:
+    """A controller that holds the friction while the body rests makes the force look like the position."""
+    move = gaussian_filter1d(np.repeat([0.0, 1.0], 600), 40)
+    position = travel * np.tile(np.concatenate([move, move[::-1]]), 4)
+    z = deflections(np.diff(position), np.full(len(position) - 1, 3e-6))
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(z))
+    force = 8 * np.gradient(np.gradient(position, DT), DT) + 15 / 3e-6 * z + noise
+    log = record("there and back", DT, position=position, reference=position, force=force)
+    assert recognised(log, Path("log.csv"))[0] == "moves"
 
 
 def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:

@@ -88,13 +88,16 @@ def test_a_search_about_a_first_value_bounds_nothing(bounded: set[int]) -> None:
     assert _range(fit, RATIO) == pytest.approx((8.0, 32.0) if bounded else (-np.inf, np.inf))
 
 
-@pytest.mark.parametrize(("beyond", "left"), [((1.1, 1.4, 1.5, 1.6), True), ((1.1, 1.4, 0.9, 1.6), False)])
+@pytest.mark.parametrize(
+    ("beyond", "left"),
+    [((1.1, 1.4, 1.5, 1.6), True), ((1.1, 1.4, 0.9, 1.6), False), ((1.1, np.inf, np.inf, np.inf), True)],
+)
 def test_stiffer_bristles_beside_errors_of_the_position(
     beyond: tuple[float, ...], left: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Bristles are refused if stiffer ones leave no more of the record than of a simulated log of their own machine."""
     stiffness = Estimate.normal("friction.bristle_stiffness", "N/m", 3e5, 2e4, "drawn")
-    problem = SimpleNamespace(names=(stiffness.name,), closed=False)
+    problem = SimpleNamespace(names=(stiffness.name,), closed=False, parameters=[SimpleNamespace(high=1e8)])
     fit: Any = SimpleNamespace(problem=problem, inner=np.array([np.log(3e5)]), free=(0,), slopes=None)
     refitted = SimpleNamespace(inner=np.zeros((4, 1)), cost=2.0 * np.array(beyond))
     own = SimpleNamespace(residuals=lambda inner: np.full((1, 100), 2**0.5))
@@ -168,15 +171,16 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     assert bool(quality.without) == doubted
 
 
-def test_vibration_beyond_the_moves_does_not_hide_the_mass() -> None:
+@pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 4.0, 5.0])
+def test_vibration_beyond_the_moves_does_not_hide_the_mass(phase: float) -> None:
     """A loop that shakes on the steps of its encoder: force and position swing at 40 Hz, but not as a mass does."""
     time = np.arange(8000) * 1e-3
     position, swing = 0.05 * np.sin(2 * np.pi * 0.5 * time), 2 * np.pi * 40 * time
     velocity, acceleration = np.gradient(position, time), np.gradient(np.gradient(position, time), time)
     force = 8.0 * acceleration + 20.0 * velocity + 4.0 * np.sign(velocity) + 15.0 * np.sin(swing)
-    log = record("shaking", 1e-3, position=position + 4e-5 * np.sin(swing + 2), force=force)
-    whole, within = inverse_model(log, bandwidth_of(log)), inverse_model(log)
-    assert whole.error > 0.5 > 5 * within.error
+    log = record("shaking", 1e-3, position=position + 4e-5 * np.sin(swing + phase), force=force)
+    within = inverse_model(log)
+    assert within.bandwidth < bandwidth_of(log) / 1.5
     for name, value in (("mass", 8.0), ("viscous", 20.0), ("coulomb", 4.0)):
         estimate = within.estimate(name)
         assert estimate.low <= value <= estimate.high

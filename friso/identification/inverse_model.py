@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -167,7 +168,8 @@ def inverse_model(
     that moves with the measured cart, on which friction acts.
 
     `bandwidth` [Hz] is the motion's, taken from the log by default. A log may vibrate beyond its moves, as a loop does
-    on the steps of an encoder: if the model is poor there, smaller bandwidths are tried, and count if it is not poor.
+    on the steps of an encoder: if the model is poor there, smaller bandwidths are tried. One counts if its model is not
+    poor, and its error half as large.
 
     `averaged` is the number of samples over which the log's force is averaged; the columns are averaged alike. `extra`
     columns by name, shape (n,), are fitted as well, and their part is subtracted from the measured force. Raises
@@ -218,18 +220,24 @@ def inverse_model(
 def _within_its_moves(
     log: Log, by_direction: bool, cart_share: float, averaged: int, extra: Mapping[str, np.ndarray]
 ) -> InverseModel:
-    """Fit an inverse model within the bandwidth of a log, or, if it is poor there, within a smaller one."""
+    """Fit an inverse model within the bandwidth of a log, or, if it is poor there, within a smaller one.
+
+    A smaller bandwidth counts if the error is half of the first or less. Raises InputError as `inverse_model` does.
+    """
     poor, band = DoubtSettings.current().error_of_a_poor_model, bandwidth_of(log)
-    first = inverse_model(log, band, by_direction, cart_share, averaged, extra)
-    if first.error <= poor:
-        return first
-    for part in IdentificationSettings.current().bandwidths_within_vibration:
-        try:
+    first: InverseModel | InputError
+    try:
+        first = inverse_model(log, band, by_direction, cart_share, averaged, extra)
+    except InputError as error:  # vibration may be against the force, as of a negative mass
+        first = error
+    worse = first.error if isinstance(first, InverseModel) else 1.0
+    for part in IdentificationSettings.current().bandwidths_within_vibration if worse > poor else ():
+        with suppress(InputError):
             model = inverse_model(log, part * band, by_direction, cart_share, averaged, extra)
-        except InputError:  # too short, or hardly moving
-            return first
-        if model.error <= poor:
-            return model
+            if model.error <= min(poor, worse / 2):
+                return model
+    if isinstance(first, InputError):
+        raise first
     return first
 
 

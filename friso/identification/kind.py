@@ -145,9 +145,10 @@ class ExperimentKind(Generic[Result]):
     logs are realisations of one experiment, `responses` if frequency responses from another instrument are accepted.
 
     `claims` returns why a log without a stated kind may be of this kind, or None; `claims_together` does so for several
-    logs together. `around` makes a stage with assumed values for a log if none is given. `notes` are remarks on results
-    for the engineer, with or without a stage; `doubts` are sentences against trusting a result. `failed` returns true
-    if the analysis failed, even if parts of the result hold. Functions raise InputError for logs that cannot be used.
+    logs together. A kind claims logs `instead_of` other kinds that would claim them too. `around` makes a stage with
+    assumed values for a log if none is given. `notes` are remarks on results for the engineer, with or without a stage;
+    `doubts` are sentences against trusting a result. `failed` returns true if the analysis failed, even if parts of the
+    result hold. Functions raise InputError for logs that cannot be used.
     """
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
@@ -163,6 +164,7 @@ class ExperimentKind(Generic[Result]):
     responses: bool = False
     claims: Callable[[Course], str | None] | None = None
     claims_together: Callable[[Sequence[Course]], str | None] | None = None
+    instead_of: tuple[str, ...] = ()
     around: Callable[[Log], Stage | None] | None = None
     notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
     predictor: Predictor[Result] | None = None

@@ -353,6 +353,9 @@ class ExperimentSettings(Settings):
     samples_of_presliding: int = setting(1000, "")
     """Fewest samples of a record of pre-sliding. With fewer, the interval is useless."""
 
+    share_better_of_a_spring: float = setting(0.01, "")
+    """Smallest fraction of the residual by which a spring must fit better than the softest bristles of a bearing."""
+
     bending_range: tuple[float, ...] = setting((1e-6, 5.0), "")
     """Range of the bristles' bending parameter in a fit, relative to the motion: from a straight line to immediate
     slip."""

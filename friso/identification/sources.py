@@ -267,6 +267,8 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     course = Course(log)
     claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
     reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}
+    replaced = {other for name in reasons for other in KINDS[name].instead_of}
+    reasons = {name: reason for name, reason in reasons.items() if name not in replaced}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
     names = sorted(reasons or KINDS, key=lambda name: KINDS[name].around is None)

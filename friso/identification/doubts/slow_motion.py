@@ -23,9 +23,9 @@ SLIDING = ("friction.coulomb", "friction.viscous", "friction.viscous_asymmetry")
 def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     """Refuse friction of a record that is too slow for the Stribeck effect to decay.
 
-    Such a record shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter. The
-    record must reach a multiple of the Stribeck velocity. If the velocity is not determined, it may be the highest of
-    any bearing, which the record must reach.
+    Such a record shows the sum of the effect and Coulomb friction, of which Coulomb friction is at least a quarter, and
+    at most all of it at the highest speed. The record must reach a multiple of the Stribeck velocity. If the velocity
+    is not determined, it may be the highest of any bearing, which the record must reach.
     """
     if "friction.stribeck_velocity" not in case.flat:
         return
@@ -44,10 +44,10 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def _bounded(estimates: Sequence[Estimate], coulomb: Estimate, rise: float, why: str) -> dict[str, Estimate]:
-    """Return Coulomb friction without a value, `why`, and static friction if it has none, each with its range.
+    """Return the range of Coulomb friction, which is left without a value, and that of static friction without one.
 
-    `rise` [N] is by how much friction exceeds the fitted Coulomb friction at the highest speed: at most all of it is
-    Coulomb friction, since a Stribeck effect that still acts may pass for viscous friction.
+    `why` is the reason. `rise` [N] is by how much friction exceeds the fitted Coulomb friction at the highest speed: at
+    most all of it is Coulomb friction, since a Stribeck effect that still acts may pass for viscous friction.
     """
     (bounded,) = refused([coulomb], {coulomb.name: why}).values()
     bounded = replace(bounded, high=bounded.high + max(rise, 0.0))

@@ -8,6 +8,7 @@ import numpy as np
 
 from friso.identification.doubt import Doubt, KeyCase, RaisedDoubt
 from friso.identification.output_error.parameters import BRISTLES
+from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.refine import mean_square, refine_fit
 from friso.identification.output_error.repeated import simulated_log
 from friso.identification.output_error.settings import OutputErrorSettings
@@ -28,7 +29,8 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
     if STIFFNESS not in case.determined or fit.problem.closed:
         return
     place, settings = fit.problem.names.index(STIFFNESS), OutputErrorSettings.current()
-    stiffer = np.log(DoubtSettings.current().stiffer_bristles)
+    most = np.log(fit.problem.parameters[place].high) - fit.inner[place]
+    stiffer = np.array([more for more in np.log(DoubtSettings.current().stiffer_bristles) if more <= most])
     tried = np.repeat(fit.inner[None], 1 + len(stiffer), axis=0)
     tried[1:, place] += stiffer
     free = np.isin(np.arange(len(fit.inner)), [number for number in fit.free if number != place])
@@ -40,15 +42,20 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
         settings.cost_share_of_refinement,
         slopes=fit.slopes,
     )
-    rng, part = np.random.default_rng(settings.seed_of_repetitions), case.log.longest
-    simulated = [
-        simulated_log(fit.problem, inner, case.log, part, case.inverse.bandwidth, case.quality.noise, rng)
-        for inner in refitted.inner
+    rng = np.random.default_rng(settings.seed_of_repetitions)
+    beyond = [
+        cost / mean_square(_own_log(case, inner, rng).residuals(inner[None]))[0]
+        for inner, cost in zip(refitted.inner, refitted.cost, strict=True)
+        if np.isfinite(cost)
     ]
-    own = [mean_square(log.residuals(inner[None]))[0] for log, inner in zip(simulated, refitted.inner, strict=True)]
-    beyond = refitted.cost / np.array(own)
-    if beyond[1:].min() <= max(1.0, beyond[0]):
+    if np.isfinite(refitted.cost[0]) and min(beyond[1:], default=np.inf) <= max(1.0, beyond[0]):
         yield RaisedDoubt(refuses=dict.fromkeys(BRISTLES, WHY))
+
+
+def _own_log(case: KeyCase, inner: np.ndarray, rng: np.random.Generator) -> Problem:
+    """Return the problem of fitting a simulated log of the machine with the fitted numbers `inner`."""
+    bandwidth, noise = case.inverse.bandwidth, case.quality.noise
+    return simulated_log(case.fit.problem, inner, case.log, case.log.longest, bandwidth, noise, rng)
 
 
 DOUBT = Doubt(

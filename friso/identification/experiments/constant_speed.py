@@ -15,7 +15,12 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
-from friso.identification.readings.friction_velocity import FrictionVelocity, distinct, friction_velocity
+from friso.identification.readings.friction_velocity import (
+    FrictionVelocity,
+    distinct,
+    friction_velocity,
+    mass_of,
+)
 from friso.identification.readings.passes import passes
 from friso.identification.readings.settings import ReadingSettings
 from friso.stage import Stage
@@ -30,12 +35,12 @@ class FrictionAtSpeeds:
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
-    """Analyse a log of constant speeds, with the loop's crossover, and with the masses if they are known."""
+    """Analyse a log of constant speeds, with the loop's crossover, and with the assumed masses or that of the log."""
     (log,) = logs
     assert isinstance(log, Log)
-    mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
-    friction = friction_velocity(log, mass or None, _stated_exponent(prior))
-    return FrictionAtSpeeds(friction, friction_position(log, mass, crossover))
+    assumed, crossover = sum(prior.masses(log)) or None, bandwidth(prior.flat(log))
+    friction = friction_velocity(log, assumed, _stated_exponent(prior))
+    return FrictionAtSpeeds(friction, friction_position(log, assumed or mass_of(log)[0], crossover))
 
 
 def _stated_exponent(prior: Prior) -> float | None:

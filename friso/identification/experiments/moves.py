@@ -14,7 +14,6 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Predicto
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
-from friso.identification.readings.course import Course
 from friso.identification.settings import ExperimentSettings
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
@@ -39,11 +38,6 @@ ALIKE = (
     "a play of about {} between motor and load would look like these bristles: their stiffness holds for an axis "
     "without play"
 )
-
-
-def _claims(course: Course) -> str | None:
-    """Return why a log holds moves, or None if the bearing never slides in it."""
-    return None if course.sticks else course.moves
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
@@ -150,7 +144,7 @@ KIND = ExperimentKind[IdentifiedMoves](
     _estimates,
     _correlated,
     after=("frequency", "steps"),
-    claims=_claims,
+    claims=lambda course: course.moves,
     foreign=("force", "disturbance"),
     around=_around,
     notes=_notes,

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from friso.errors import InputError
 from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
+from friso.identification.output_error.parameters import bends
 from friso.identification.readings.at_bearing import (
     DIRECT,
     HELD,
@@ -49,7 +51,7 @@ from friso.stage import Stage
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
-SLIDES = "the bearing slides, or noise is as large as the force"
+SLIDES = "the bearing slides, a spring acts, or noise is as large as the force"
 
 VISCOUS = "friction.viscous"
 
@@ -86,9 +88,9 @@ class _Fit:
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife. `doubt`, shape (3,),
     is how far the residual may have shifted each value. `late` [s] is the delay of the force beyond the assumed delay.
-    `ends` is true if the search for the bristles' bending q stopped at a limit. `left` is the unexplained fraction of
-    the friction. Low-passed signals over time [s], shape (n,), are the position of the body on the bearing, its force
-    and the model's.
+    `ends` is true if the search for the bristles' bending q stopped at a limit, or came to those of a spring. `left` is
+    the unexplained fraction of the friction. Low-passed signals over time [s], shape (n,), are the position of the body
+    on the bearing, its force and the model's.
     """
 
     values: np.ndarray
@@ -124,7 +126,10 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
         (experiment_settings.low_pass_of_a_check * cutoff, looked_for),
         *([] if looked_for else [(cutoff, True)]),
     ]
-    best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
+    longest = bends(log.axis)[1]
+    if np.ptp(record.body) >= longest * experiment_settings.bending_range[1]:
+        return _nothing(f"the motion is wider than bristles bend: {SLIDES}")
+    best, *others = (_converged_fit(_seen(record, top), between, top, late, longest) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
     even = best.doubt + reading_settings.linearity_of_sensors * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
@@ -164,11 +169,9 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
-    if fit.ends:
-        return f"the bristles yield: {SLIDES}"
     if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
         return "the stiffness is like that of the joint: is it held?"
-    return ""
+    return f"no bristles bend so little, or so far: {SLIDES}" if fit.ends else ""
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
@@ -185,18 +188,19 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
 
 
-def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
+def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool, longest: float) -> _Fit:
     """Fit twice, the second time with the mass and, if `late`, the delay that the first gives."""
-    fit = _fit(record, between, cutoff, between.mass, late)
+    fit = _fit(record, between, cutoff, between.mass, late, longest)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
-    return _fit(record, delayed, cutoff, float(fit.values[0]), late)
+    return _fit(record, delayed, cutoff, float(fit.values[0]), late, longest)
 
 
-def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
+def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool, longest: float) -> _Fit:
     """Fit the force below a low-pass frequency [Hz] by least squares.
 
-    The bending of the bristles, which is nonlinear, is searched. `mass` [kg] is the assumed moving mass; if `late`, the
-    effect of a slightly larger delay is among the columns.
+    The bending of the bristles, which is nonlinear, is searched. They bend by `longest` [m] at most before they slide:
+    if softer ones fit better, they are a spring. `mass` [kg] is the assumed moving mass; if `late`, the effect of a
+    slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
@@ -206,10 +210,11 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
         x = equation.columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
 
-    best: Any = minimize_scalar(
-        off, bounds=tuple(np.log(experiment_settings.bending_range)), method="bounded", options={"xatol": 1e-3}
-    )
-    bending = float(np.exp(best.x)) / span
+    least, most = experiment_settings.bending_range
+    limits = float(np.log(least)), float(np.log(most))
+    best: Any = minimize_scalar(off, bounds=limits, method="bounded", options={"xatol": 1e-3})
+    bending, softest = float(np.exp(best.x)) / span, float(np.log(max(span / longest, least)))
+    spring = best.x < softest and best.fun < (1 - experiment_settings.share_better_of_a_spring) * off(softest)
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
     bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
@@ -219,7 +224,7 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = bending * span > 0.99 * experiment_settings.bending_range[1], float(solution[-1]) if late else 0.0
+    ends, more = spring or bending * span > 0.99 * most, float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
     return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves)
 
@@ -309,10 +314,14 @@ def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated
 
 
 def _claims(course: Course) -> str | None:
-    """Return why a log holds motion before sliding, or None: moves in which the bearing never slides."""
-    if course.moves is None or not course.sticks:
+    """Return why a log holds motion before sliding, or None: moves, large or small, that bristles alone explain."""
+    if course.moves is None or not course.may_stick:
         return None
-    return "the position follows the force, within what bristles bend: the bearing never slides"
+    try:
+        shown = bristles_from_presliding(course.log.per_unit_of_force())
+    except InputError:
+        return None
+    return "bristles explain the force, which stays below that of sliding" if shown.stiffness.determined else None
 
 
 KIND = ExperimentKind[Presliding](
@@ -321,6 +330,7 @@ KIND = ExperimentKind[Presliding](
     _correlated,
     after=("constant-speed", "frequency", "moves"),
     claims=_claims,
+    instead_of=("moves",),
     foreign=("force",),
     per_unit=True,
 )

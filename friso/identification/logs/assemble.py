@@ -123,19 +123,25 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, nee
 
 
 def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes) -> list[str]:
-    """Write what time stamps say against a specified sample time; nothing if they agree, or tell no seconds."""
-    specified, clock = reading.mapping.sample_time, chosen.get("time")
-    if specified is None or (clock is not None and not clock.channel.unit):
+    """Write what time stamps say against a specified sample time; nothing if they agree, or are no seconds."""
+    specified = reading.mapping.sample_time
+    if specified is None:
         return []
     stamped = replace(reading, mapping=replace(reading.mapping, sample_time=None))
-    signals = [choice for role, choice in chosen.items() if role != "time"]
-    every = [stamps for choice in signals if (stamps := instants(choice, clock, stamped, notes)) is not None]
-    usual = [float(np.median(np.diff(stamps))) for stamps in every if stamps.size > 1]
-    if not usual or abs(usual[0] / specified - 1) <= LogSettings.current().difference_of_a_contradiction:
+    choice = next(choice for role, choice in chosen.items() if role != "time")
+    try:
+        stamps = instants(choice, chosen.get("time"), stamped, notes)
+    except InputError:  # in a unit that is none of time
+        return []
+    rising = np.empty(0) if stamps is None else stamps[np.isfinite(stamps)]
+    if rising.size < 2 or rising.size < stamps.size or (np.diff(rising) < 0).any():
+        return []
+    usual = float(rising[-1] - rising[0]) / (rising.size - 1)
+    if abs(usual / specified - 1) <= LogSettings.current().difference_of_a_contradiction:
         return []
     return [
-        f"time: the time stamps are {usual[0]:.4g} s apart, not {specified:.4g} s as specified: a mass follows from "
-        "the square of it"
+        f"time: the time stamps are {usual:.4g} s apart, not {specified:.4g} s as specified: a mass follows from the "
+        "square of it"
     ]
 
 

@@ -142,10 +142,11 @@ def check_gaps(
         free = [channel for channel, _ in _fitting(role, table, taken.values()) if not is_ramp(channel)]
         likely, why = _by_mechanics(role, readings, free) or _likeliest(role, table, taken)
         example = option("--map", role, likely.name) if likely else ""
-        free = [c for c in signals if not any(c is choice.channel for choice in proposal.chosen.values())]
-        left = listing(table, [c for c in table.channels if not any(c is other for other in free)])
+        used = {id(channel) for channel in taken.values()}
+        open_to_it = {id(channel) for channel in signals} - used
+        left = listing(table, [channel for channel in table.channels if id(channel) not in open_to_it])
         missing = f"a channel of the {role}: export the log with it"
-        expected = left + (guess(likely.name) if likely else "") if free else missing
+        expected = left + (guess(likely.name) if likely else "") if open_to_it else missing
         gaps.append(LogError(role, f"no channel whose name suggests it{why}", expected, example, origin))
         if likely:
             chosen[role] = AssignedRole(role, likely, "", True)

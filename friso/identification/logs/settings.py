@@ -137,7 +137,8 @@ class LogSettings(Settings):
     """Largest number of lost samples in a row that are interpolated. Longer gaps split a record."""
 
     share_of_gaps: float = setting(0.1, "")
-    """Ratio of gaps to samples above which sampling counts as uneven. Gaps that are filled do not count."""
+    """Ratio of gaps to samples above which sampling counts as uneven. Gaps between even time stamps
+    that are filled do not count."""
 
     difference_of_a_contradiction: float = setting(0.05, "")
     """Relative difference of a specified sample time from that of the time stamps, above which it is mentioned."""

@@ -56,11 +56,12 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     )
     whole = np.abs(steps / period - 1 - lost) <= scatter  # otherwise the clock was reset
     bridged = long & whole & (lost >= 1) & (lost <= settings.samples_bridged)
-    uneven = float((long & ~bridged).mean())
+    even = np.abs(steps / period - 1 - lost).max() <= settings.scatter_of_even_stamps
+    uneven = float((long & ~bridged).mean() if even else long.mean())
     if uneven > settings.share_of_gaps:
         usual = f"{settings.sample_times_of_a_gap} times the usual {np.median(steps):.4g} s"
         actual = f"time stamps with {percent(uneven)} of the steps over {usual}"
-        raise LogError(name, actual, "uniform sampling, or the true sample time", f'--dt "{period * 1e3:.4g} ms"')
+        raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "NUMBER ms"')
     edges = [0, *(np.flatnonzero(long & ~bridged) + 1).tolist(), time.size]
     inserted = np.where(bridged, lost, 0).astype(int)
     parts = [_bridged(time[a:b], values[a:b], inserted[a : b - 1]) for a, b in pairwise(edges)]

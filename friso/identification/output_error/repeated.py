@@ -101,7 +101,7 @@ def _measured(position: np.ndarray, log: Log, part: slice, problem: Problem, rng
     if log.is_integrated:
         return position + np.cumsum(noise_of(log["velocity"][part]) * white) * log.sample_time
     if digit > 0 and noise_of(logged) <= digit / np.sqrt(12):
-        return digit * np.rint(position / digit)
+        return logged[0] + digit * np.rint((position - logged[0]) / digit)
     return position + blur_of(logged, problem.inputs.reference) * white
 
 

@@ -64,11 +64,11 @@ class Course:
 
     @cached_property
     def moves(self) -> str | None:
-        """Return why a log holds moves, large or small; None for an experiment that drives the body in its own way.
+        """Return why a log holds moves of any size; None for an experiment that drives the body in a way of its own.
 
-        The reference of such a log moves. Otherwise it has no series of constant speeds or
-        force ramps, and its driving signal must meet one of two conditions. It does not repeat, and the log has no
-        reference; or it repeats with rests in between, or with few frequencies, as sines do.
+        The reference of such a log moves. Otherwise it has no series of constant speeds or force ramps, and its driving
+        signal must meet one of two conditions. It does not repeat, and the log has no reference; or it repeats with
+        rests in between, or with few frequencies, as sines do.
         """
         if self.reference_moves:
             return "its reference moves"
@@ -86,17 +86,17 @@ class Course:
         return None
 
     @cached_property
-    def sticks(self) -> bool:
+    def may_stick(self) -> bool:
         """Tell whether the body moves within what bristles bend, and its place explains most of the force.
 
-        The force of a body that slides has the sign of its velocity, and does not follow from the place.
+        A body that slides there and back may look alike, if a controller holds its friction while it rests.
         """
         part = self.log.longest
         position, force = self.log["position"][part], self.log["force"][part]
         if not (0 < np.ptp(position) < 2 * bends(self.log.axis)[1] and np.ptp(force) > 0):
             return False
-        correlation = float(np.corrcoef(position, force)[0, 1])
-        return correlation > 0 and correlation**2 > 0.5
+        least = ReadingSettings.current().variance_share_of_bristles
+        return float(np.corrcoef(position, force)[0, 1]) > np.sqrt(least)
 
     @cached_property
     def speeds(self) -> np.ndarray:

@@ -72,7 +72,7 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     """
     stretches = passes(log)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
-    inertia = (mass, 0.0) if mass is not None else _mass(log)
+    inertia = mass_of(log) if mass is None else (mass, 0.0)
     velocities, forces, errors, swings = np.array([_row(stretch, *inertia) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
@@ -94,16 +94,17 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, tuple(warnings))
 
 
-def _mass(log: Log) -> tuple[float, float]:
+def mass_of(log: Log) -> tuple[float, float]:
     """Read the moving mass [kg] off a log by the inverse model, with the half-width of its interval [kg].
 
-    Both are 0 for a log that the inverse model cannot read: too short, or hardly moving.
+    Both are 0 for a log from which the inverse model reads none: it is short, hardly moves, or its force has the wrong
+    sign.
     """
     try:
         mass = inverse_model(log).estimate("mass")
     except InputError:
         return 0.0, 0.0
-    return mass.value, (mass.high - mass.low) / 2
+    return (mass.value, mass.half_width) if mass.determined else (0.0, 0.0)
 
 
 def _row(stretch: Pass, mass: float, error: float) -> tuple[float, float, float, float]:

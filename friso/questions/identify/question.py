@@ -231,7 +231,7 @@ def identify(
     result = replace(result, warnings=(*left_out, *reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
     if keep is not None and not result.failed and not nothing_learnt(result.estimates, False):
-        keep({file.path: _worth_keeping(file.mapping, result) for file in inputs})
+        keep({file.path: _worth_keeping(file, result) for file in inputs})
     checked = None
     if check and result.stage is not None:
         from friso.questions.check.question import checked_stage
@@ -240,14 +240,14 @@ def identify(
     return IdentifyAnswer(result, inputs=inputs, predictions=predictions, axis_kind=axis_kind, checked=checked)
 
 
-def _worth_keeping(mapping: Mapping, result: Identification) -> Mapping:
-    """Return what the user said of a log's channels, without a kind of experiment that determined no key."""
-    useless = [
-        experiment.kind
+def _worth_keeping(file: LogFile, result: Identification) -> Mapping:
+    """Return what the user said of a log, without a kind of experiment of which it determined no key."""
+    useless = any(
+        experiment.estimates and not any(estimate.determined for estimate in experiment.estimates)
         for experiment in result.experiments
-        if experiment.estimates and not any(estimate.determined for estimate in experiment.estimates)
-    ]
-    return replace(mapping, experiment=None) if mapping.experiment in useless else mapping
+        if file.kind == experiment.kind and any(log.name == file.source.name for log in experiment.logs)
+    )
+    return replace(file.mapping, experiment=None) if useless else file.mapping
 
 
 def _in_one_line(error: InputError) -> str:
