@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from friso.errors import InputError
 from friso.identification.doubt import KeyCase
 from friso.identification.doubts import lost_inertia, slow_motion, stiffer_bristles
 from friso.identification.doubts.break_away_friction import friction_beyond
@@ -185,6 +186,16 @@ def test_vibration_beyond_the_moves_does_not_hide_the_mass(phase: float) -> None
         estimate = within.estimate(name)
         assert estimate.low <= value <= estimate.high
         assert estimate.half_width < 0.2 * value
+
+
+def test_friction_before_sliding_is_no_force_of_the_wrong_sign() -> None:
+    """A force that goes with the position, and feeds friction, is not one that accelerates a mass backward."""
+    time, rng = np.arange(6000) * 1e-3, np.random.default_rng(3)
+    position = 1e-6 * sum(np.sin(2 * np.pi * line * time + rng.uniform(0, 6)) for line in (0.7, 3.1, 11.3))
+    force = 1e6 * position + 3e3 * np.gradient(position, time) + 0.3 * rng.standard_normal(len(time))
+    assert inverse_model(record("small", 1e-3, position=position, force=force)).estimate("mass").high < 0
+    with pytest.raises(InputError, match="scale"):
+        inverse_model(record("moves", 1e-3, position=position, force=-8.0 * np.gradient(np.gradient(position))))
 
 
 def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:

@@ -206,7 +206,9 @@ def inverse_model(
         _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
         for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
-    if estimates[0].high < 0:
+    residual, power = np.linalg.norm(force - fitted), float(force @ velocity)  # the motor feeds friction
+    poor = residual > DoubtSettings.current().error_of_a_poor_model * np.linalg.norm(force)
+    if estimates[0].high < 0 and (power < 0 or not poor):
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
         raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)

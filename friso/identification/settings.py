@@ -129,6 +129,9 @@ class DoubtSettings(Settings):
     """Number of pitches tried per additional period along the travel. Between two of them the phase slips by a quarter
     turn."""
 
+    digits_of_a_play: float = setting(3.0, "")
+    """Smallest width of a play that can be named, in steps of the position."""
+
     stiffer_bristles: tuple[float, ...] = setting((4.0, 8.0, 16.0), "")
     """Stiffnesses of bristles that are tried beside the fitted one, relative to it."""
 
@@ -353,8 +356,20 @@ class ExperimentSettings(Settings):
     samples_of_presliding: int = setting(1000, "")
     """Fewest samples of a record of pre-sliding. With fewer, the interval is useless."""
 
-    share_better_of_a_spring: float = setting(0.01, "")
-    """Smallest fraction of the residual by which a spring must fit better than the softest bristles of a bearing."""
+    share_of_a_seen_spring: float = setting(0.02, "")
+    """Smallest residual of bristles, relative to the force, that a spring beside them may explain."""
+
+    bend_share_of_a_seen_spring: float = setting(0.1, "")
+    """Smallest motion that tells a spring from bristles, relative to the longest bend. A smaller one shows a line."""
+
+    share_left_by_soft_bristles: float = setting(0.99, "")
+    """Fraction of the squared residual below which bristles softer than those of a bearing fit better: a spring."""
+
+    share_left_by_a_spring: float = setting(0.25, "")
+    """Fraction of the squared residual below which a spring beside the bristles is taken to act."""
+
+    bending_beside_a_spring: float = setting(200.0, "")
+    """Largest bending parameter of bristles that is tried beside a spring, relative to the motion."""
 
     bending_range: tuple[float, ...] = setting((1e-6, 5.0), "")
     """Range of the bristles' bending parameter in a fit, relative to the motion: from a straight line to immediate

@@ -10,7 +10,7 @@ import numpy as np
 from friso.identification.doubt import Doubt, FitCase, FittedCase, RaisedDoubt, TriedForces
 from friso.identification.inverse_model import motion
 from friso.identification.output_error.parameters import MASS
-from friso.identification.readings.common import runs
+from friso.identification.readings.common import digit_of, runs
 from friso.identification.settings import DoubtSettings, IdentificationSettings
 from friso.quantities import percent
 
@@ -18,8 +18,8 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
-    If the widest play that is tried explains most, something slower is the cause: no play is named, but the intervals
-    are widened.
+    If the widest play that is tried explains most, something slower is the cause; if the play is as narrow as the steps
+    of the position, they may be it. No play is named then, but the intervals are widened.
     """
     settings, effect = DoubtSettings.current(), case.led_by("play")
     if effect is None:
@@ -34,8 +34,9 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         f"{percent(share)} of the {what} while the load crosses it; it passes for soft bristles, which are refused, "
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
-    slower, named = np.isclose(width, max(settings.plays_tried)), case.named(effect, words, width, "m")
-    yield replace(named, words="", explains=False) if slower else named
+    named, digit = case.named(effect, words, width, "m"), digit_of(case.log["position"][case.log.longest])
+    unsure = np.isclose(width, max(settings.plays_tried)) or width < settings.digits_of_a_play * digit
+    yield replace(named, words="", explains=False) if unsure else named
 
 
 def forces(case: FittedCase) -> Iterator[TriedForces]:

@@ -51,7 +51,7 @@ from friso.stage import Stage
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
-SLIDES = "the bearing slides, a spring acts, or noise is as large as the force"
+SLIDES = "the bearing slides, or noise is as large as the force"
 
 VISCOUS = "friction.viscous"
 
@@ -88,9 +88,9 @@ class _Fit:
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife. `doubt`, shape (3,),
     is how far the residual may have shifted each value. `late` [s] is the delay of the force beyond the assumed delay.
-    `ends` is true if the search for the bristles' bending q stopped at a limit, or came to those of a spring. `left` is
-    the unexplained fraction of the friction. Low-passed signals over time [s], shape (n,), are the position of the body
-    on the bearing, its force and the model's.
+    `ends` is true if the search for the bristles' bending q stopped at its upper limit, `spring` if a spring to ground
+    explains the force better. `left` is the unexplained fraction of the friction. Low-passed signals over time [s],
+    shape (n,), are the position of the body on the bearing, its force and the model's.
     """
 
     values: np.ndarray
@@ -98,6 +98,7 @@ class _Fit:
     doubt: np.ndarray
     late: float
     ends: bool
+    spring: bool
     left: float
     time: np.ndarray
     position: np.ndarray
@@ -171,7 +172,13 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
         return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
     if held and 0 < fit.values[KEYS.index(STIFFNESS)] < experiment_settings.stiffness_ratio_of_a_joint * between.joint:
         return "the stiffness is like that of the joint: is it held?"
-    return f"no bristles bend so little, or so far: {SLIDES}" if fit.ends else ""
+    if fit.ends:
+        return f"the bristles yield: {SLIDES}"
+    return (
+        "a spring to ground acts, such as a flexure or a cable, beside bristles or instead of them"
+        if fit.spring
+        else ""
+    )
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
@@ -184,7 +191,11 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     estimate = by_t(key, UNITS[key], Mean(value, error, settings.blocks_of_a_mean - 1), METHOD, systematic, systematic)
     if estimate.low > 0:
         return estimate
-    why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
+    why = (
+        "the motion is too slow to show it"
+        if key != STIFFNESS
+        else "no force holds the bearing: does it stick? repeat it with a smaller force"
+    )
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
 
 
@@ -199,22 +210,29 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     """Fit the force below a low-pass frequency [Hz] by least squares.
 
     The bending of the bristles, which is nonlinear, is searched. They bend by `longest` [m] at most before they slide:
-    if softer ones fit better, they are a spring. `mass` [kg] is the assumed moving mass; if `late`, the effect of a
-    slightly larger delay is among the columns.
+    if softer ones fit better, or a spring beside bristles explains most of what these leave, a spring acts. `mass` [kg]
+    is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
 
-    def off(logarithm: float) -> float:
-        x = equation.columns(float(np.exp(logarithm)) / span)
+    def off(logarithm: float, *springs: np.ndarray) -> float:
+        """Return the sum of squares that bristles of this bending leave, with or without a spring beside them."""
+        x = np.column_stack([equation.columns(float(np.exp(logarithm)) / span), *springs])
         return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
 
-    least, most = experiment_settings.bending_range
-    limits = float(np.log(least)), float(np.log(most))
-    best: Any = minimize_scalar(off, bounds=limits, method="bounded", options={"xatol": 1e-3})
-    bending, softest = float(np.exp(best.x)) / span, float(np.log(max(span / longest, least)))
-    spring = best.x < softest and best.fun < (1 - experiment_settings.share_better_of_a_spring) * off(softest)
+    least, most = map(float, np.log(experiment_settings.bending_range))
+    best: Any = minimize_scalar(off, bounds=(least, most), method="bounded", options={"xatol": 1e-3})
+    bending = float(np.exp(best.x)) / span
+    softest = max(float(np.log(span / longest)), least)
+    beside = equation.low_pass(equation.body - equation.body.mean())
+    tried = np.linspace(least, float(np.log(experiment_settings.bending_beside_a_spring)), 40)
+    visible = experiment_settings.share_of_a_seen_spring * float(np.linalg.norm(target - target.mean()))
+    soft, both = experiment_settings.share_left_by_soft_bristles, experiment_settings.share_left_by_a_spring
+    spring = best.fun > visible**2 and min(off(bent, beside) for bent in tried) < both * best.fun
+    if span > experiment_settings.bend_share_of_a_seen_spring * longest and best.x < softest:
+        spring |= best.fun < soft * off(softest)
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
     bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
@@ -224,9 +242,9 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = spring or bending * span > 0.99 * most, float(solution[-1]) if late else 0.0
+    ends, more = best.x > most + np.log(0.99), float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
-    return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves)
+    return _Fit(solution[:3], covariance, doubt, more, bool(ends), bool(spring), left, *curves)
 
 
 def _apart(columns: np.ndarray, number: int) -> float:

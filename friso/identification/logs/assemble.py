@@ -133,10 +133,9 @@ def _contradicted(chosen: dict[str, AssignedRole], reading: Reading, notes: Note
         stamps = instants(choice, chosen.get("time"), stamped, notes)
     except InputError:  # in a unit that is none of time
         return []
-    rising = np.empty(0) if stamps is None else stamps[np.isfinite(stamps)]
-    if rising.size < 2 or rising.size < stamps.size or (np.diff(rising) < 0).any():
+    if stamps is None or stamps.size < 2 or not (np.diff(stamps) >= 0).all():
         return []
-    usual = float(rising[-1] - rising[0]) / (rising.size - 1)
+    usual = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
     if abs(usual / specified - 1) <= LogSettings.current().difference_of_a_contradiction:
         return []
     return [
