@@ -241,9 +241,9 @@ def identify(
 
 
 def _worth_keeping(file: LogFile, result: Identification) -> Mapping:
-    """Return what the user said of a log, without a kind of experiment of which it determined no key."""
+    """Return what the user said of a log, without a kind of experiment that determined or bounded no key of it."""
     useless = any(
-        experiment.estimates and not any(estimate.determined for estimate in experiment.estimates)
+        nothing_learnt(experiment.estimates, False)
         for experiment in result.experiments
         if file.kind == experiment.kind and any(log.name == file.source.name for log in experiment.logs)
     )
