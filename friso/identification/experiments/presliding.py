@@ -52,6 +52,7 @@ KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "fr
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
+SPRING = "a spring to ground acts, such as a flexure or a cable, beside bristles or instead of them"
 
 VISCOUS = "friction.viscous"
 
@@ -88,9 +89,9 @@ class _Fit:
 
     `values` are mass, damping and stiffness, shape (3,), with their covariance by the jackknife. `doubt`, shape (3,),
     is how far the residual may have shifted each value. `late` [s] is the delay of the force beyond the assumed delay.
-    `ends` is true if the search for the bristles' bending q stopped at its upper limit, `spring` if a spring to ground
-    explains the force better. `left` is the unexplained fraction of the friction. Low-passed signals over time [s],
-    shape (n,), are the position of the body on the bearing, its force and the model's.
+    `ends` is true if the search for the bristles' bending q stopped at its upper limit. `left` is the unexplained
+    fraction of the friction. Low-passed signals over time [s], shape (n,), are the position of the body on the bearing,
+    its force and the model's. The fit solves the `equation` with the `bending` q [1/m].
     """
 
     values: np.ndarray
@@ -98,12 +99,13 @@ class _Fit:
     doubt: np.ndarray
     late: float
     ends: bool
-    spring: bool
     left: float
     time: np.ndarray
     position: np.ndarray
     force: np.ndarray
     model: np.ndarray
+    equation: _Equation
+    bending: float
 
 
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
@@ -114,8 +116,8 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
     The intervals include: the change with a lower low-pass and with the best-fitting delay (used if no delay is known);
     the uncertainty of the viscous friction subtracted from the damping; and the residual, because the model leaves out
-    that friction falls with speed and that bristles of another law bend differently. With a large residual nothing is
-    determined. Raises InputError for missing channels.
+    that friction falls with speed and that bristles of another law bend differently. With a large residual, or beside a
+    spring to ground, nothing is determined. Raises InputError for missing channels.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     record = record_of(log, log.longest, between)
@@ -130,12 +132,12 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     longest = bends(log.axis)[1]
     if np.ptp(record.body) >= longest * experiment_settings.bending_range[1]:
         return _nothing(f"the motion is wider than bristles bend: {SLIDES}")
-    best, *others = (_converged_fit(_seen(record, top), between, top, late, longest) for top, late in tried)
+    best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
     even = best.doubt + reading_settings.linearity_of_sensors * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
     systematic = np.abs(changes).sum(axis=0) + even
-    why = _no_bristles(best, between, record.bent is None)
+    why = _no_bristles(best, between, record.bent is None, longest)
     mass, damping, stiffness = (
         Estimate.unknown(key, UNITS[key], METHOD, why) if why else _estimate(key, *map(float, numbers))
         for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
@@ -162,10 +164,11 @@ def _nothing(why: str) -> Presliding:
     return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
 
 
-def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
+def _no_bristles(fit: _Fit, between: Between, held: bool, longest: float) -> str:
     """Return why a fit shows no bristles; "" if it does.
 
-    `held` is true if the joint counts as held; a stiffness like the joint's then contradicts that.
+    `held` is true if the joint counts as held; a stiffness like the joint's then contradicts that. Bristles bend by
+    `longest` [m] at most before they slide.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     if fit.left > reading_settings.share_left_unexplained:
@@ -174,11 +177,7 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
         return "the stiffness is like that of the joint: is it held?"
     if fit.ends:
         return f"the bristles yield: {SLIDES}"
-    return (
-        "a spring to ground acts, such as a flexure or a cable, beside bristles or instead of them"
-        if fit.spring
-        else ""
-    )
+    return SPRING if _spring_acts(fit, longest) else ""
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
@@ -199,52 +198,58 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
 
 
-def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool, longest: float) -> _Fit:
+def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
     """Fit twice, the second time with the mass and, if `late`, the delay that the first gives."""
-    fit = _fit(record, between, cutoff, between.mass, late, longest)
+    fit = _fit(record, between, cutoff, between.mass, late)
     delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
-    return _fit(record, delayed, cutoff, float(fit.values[0]), late, longest)
+    return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
-def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool, longest: float) -> _Fit:
+def _spring_acts(fit: _Fit, longest: float) -> bool:
+    """Tell whether a spring to ground, beside bristles or instead of them, explains the force better than bristles.
+
+    Bristles softer than those that bend by `longest` [m] before they slide are a spring, if the motion is wide enough
+    to tell. Beside a spring, bristles may be much stiffer than without.
+    """
+    settings, equation = ExperimentSettings.current(), fit.equation
+    span, left = float(np.ptp(equation.body)), equation.squares_left(fit.bending)
+    if span > settings.bend_share_of_a_seen_spring * longest and fit.bending < 1 / longest:
+        return left < settings.share_left_by_soft_bristles * equation.squares_left(1 / longest)
+    if left <= (settings.share_of_a_seen_spring * np.linalg.norm(fit.force - fit.force.mean())) ** 2:
+        return False
+    tried = np.geomspace(settings.bending_range[0], settings.bending_beside_a_spring, 40) / span
+    spring = equation.low_pass(equation.body - equation.body.mean())
+    return min(equation.squares_left(bending, spring) for bending in tried) < settings.share_left_by_a_spring * left
+
+
+def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
     """Fit the force below a low-pass frequency [Hz] by least squares.
 
-    The bending of the bristles, which is nonlinear, is searched. They bend by `longest` [m] at most before they slide:
-    if softer ones fit better, or a spring beside bristles explains most of what these leave, a spring acts. `mass` [kg]
-    is the assumed moving mass; if `late`, the effect of a slightly larger delay is among the columns.
+    The bending of the bristles, which is nonlinear, is searched. `mass` [kg] is the assumed moving mass; if `late`, the
+    effect of a slightly larger delay is among the columns.
     """
     experiment_settings, reading_settings = ExperimentSettings.current(), ReadingSettings.current()
     equation = _equation(record, between, cutoff, mass, late)
     target, span = equation.target, float(np.ptp(equation.body))
-
-    def off(logarithm: float, *springs: np.ndarray) -> float:
-        """Return the sum of squares that bristles of this bending leave, with or without a spring beside them."""
-        x = np.column_stack([equation.columns(float(np.exp(logarithm)) / span), *springs])
-        return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
-
-    least, most = map(float, np.log(experiment_settings.bending_range))
-    best: Any = minimize_scalar(off, bounds=(least, most), method="bounded", options={"xatol": 1e-3})
+    best: Any = minimize_scalar(
+        lambda logarithm: equation.squares_left(float(np.exp(logarithm)) / span),
+        bounds=tuple(np.log(experiment_settings.bending_range)),
+        method="bounded",
+        options={"xatol": 1e-3},
+    )
     bending = float(np.exp(best.x)) / span
-    softest = max(float(np.log(span / longest)), least)
-    beside = equation.low_pass(equation.body - equation.body.mean())
-    tried = np.linspace(least, float(np.log(experiment_settings.bending_beside_a_spring)), 40)
-    visible = experiment_settings.share_of_a_seen_spring * float(np.linalg.norm(target - target.mean()))
-    soft, both = experiment_settings.share_left_by_soft_bristles, experiment_settings.share_left_by_a_spring
-    spring = best.fun > visible**2 and min(off(bent, beside) for bent in tried) < both * best.fun
-    if span > experiment_settings.bend_share_of_a_seen_spring * longest and best.x < softest:
-        spring |= best.fun < soft * off(softest)
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
-    bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
-    columns, friction = np.column_stack([x, bends]), target - x[:, 0] * solution[0]
+    bent = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
+    columns, friction = np.column_stack([x, bent]), target - x[:, 0] * solution[0]
     covariance = jackknife(columns, target)[:3, :3]
     unexplained = target - x @ solution
     hidden = np.linalg.norm(unexplained) + reading_settings.linearity_of_sensors * np.linalg.norm(friction)
     doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
     left = float(unexplained.std() / friction.std())
-    ends, more = best.x > most + np.log(0.99), float(solution[-1]) if late else 0.0
+    ends, more = bending * span > 0.99 * experiment_settings.bending_range[1], float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
-    return _Fit(solution[:3], covariance, doubt, more, bool(ends), bool(spring), left, *curves)
+    return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves, equation, bending)
 
 
 def _apart(columns: np.ndarray, number: int) -> float:
@@ -284,6 +289,11 @@ class _Equation:
         path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
         turned = map(self.low_pass, (rate_of(self.low_pass.time, z), z, np.exp(-bending * path)))
         return np.stack([self.inertia, *turned, *self.rest], axis=1)
+
+    def squares_left(self, bending: float, *further: np.ndarray) -> float:
+        """Return the sum of squares [N^2] that bristles of a bending q [1/m] leave, fitted with `further` columns."""
+        x = np.column_stack([self.columns(bending), *further])
+        return float(np.sum((self.target - x @ solve_normal_equations(x.T @ x, x.T @ self.target)) ** 2))
 
 
 def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
