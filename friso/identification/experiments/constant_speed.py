@@ -15,12 +15,7 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
-from friso.identification.readings.friction_velocity import (
-    FrictionVelocity,
-    distinct,
-    friction_velocity,
-    mass_of,
-)
+from friso.identification.readings.friction_velocity import FrictionVelocity, distinct, friction_velocity
 from friso.identification.readings.passes import passes
 from friso.identification.readings.settings import ReadingSettings
 from friso.stage import Stage
@@ -38,9 +33,8 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     """Analyse a log of constant speeds, with the loop's crossover, and with the assumed masses or that of the log."""
     (log,) = logs
     assert isinstance(log, Log)
-    assumed, crossover = sum(prior.masses(log)) or None, bandwidth(prior.flat(log))
-    friction = friction_velocity(log, assumed, _stated_exponent(prior))
-    return FrictionAtSpeeds(friction, friction_position(log, assumed or mass_of(log)[0], crossover))
+    friction = friction_velocity(log, sum(prior.masses(log)) or None, _stated_exponent(prior))
+    return FrictionAtSpeeds(friction, friction_position(log, friction.mass, bandwidth(prior.flat(log))))
 
 
 def _stated_exponent(prior: Prior) -> float | None:

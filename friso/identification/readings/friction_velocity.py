@@ -47,7 +47,7 @@ class FrictionVelocity:
 
     Per steady stretch, shape (n,), there are the velocity [m/s], and the mean force [N] without inertia with the
     half-width of its 95 % interval [N]. `unsteady`, shape (m,), has the velocities of unsteady stretches; `places` [m]
-    are the ends of the way over which steady stretches were read.
+    are the ends of the way over which steady stretches were read. `mass` [kg] is that of the inertia.
     """
 
     directions: Mapping[str, Direction]
@@ -58,6 +58,7 @@ class FrictionVelocity:
     half_widths: np.ndarray
     unsteady: np.ndarray
     places: tuple[float, float]
+    mass: float
     warnings: tuple[str, ...]
 
 
@@ -72,8 +73,8 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     """
     stretches = passes(log)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady])
-    inertia = mass_of(log) if mass is None else (mass, 0.0)
-    velocities, forces, errors, swings = np.array([_row(stretch, *inertia) for stretch in used]).reshape(-1, 4).T
+    moved, off = _mass(log) if mass is None else (mass, 0.0)
+    velocities, forces, errors, swings = np.array([_row(stretch, moved, off) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
     errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
@@ -91,10 +92,10 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
     if refuted:
         warnings.append(f"The forces refute the Stribeck exponent of the stage, {exponent:g}: it is fitted instead.")
-    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, tuple(warnings))
+    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, moved, tuple(warnings))
 
 
-def mass_of(log: Log) -> tuple[float, float]:
+def _mass(log: Log) -> tuple[float, float]:
     """Read the moving mass [kg] off a log by the inverse model, with the half-width of its interval [kg].
 
     Both are 0 for a log from which the inverse model reads none: it is short, hardly moves, or its force has the wrong
