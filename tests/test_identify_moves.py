@@ -257,6 +257,9 @@ def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, Identifie
         free = [i for i in result.free if not result.problem.parameters[i].core]
         assert np.all((starts[:, free] >= low[free] - 1e-9) & (starts[:, free] <= high[free] + 1e-9))
         assert np.ptp(starts[:, result.free[0]]) > 0
+    core = [i for i, parameter in enumerate(result.problem.parameters) if parameter.core]
+    kept = np.all(everywhere(result.problem, tuple(every), result.inner)[:, core] == result.inner[core], axis=1)
+    assert kept.mean() == pytest.approx(0.5, abs=0.01)  # where errors of mass and friction hide nothing
 
 
 def test_without_noise_the_fit_ends_at_the_truth() -> None:

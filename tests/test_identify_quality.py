@@ -231,6 +231,26 @@ def test_halves_that_differ_are_named() -> None:
     assert fair.value == sure.value
 
 
+def test_a_slow_half_is_not_compared_with_a_fast_one() -> None:
+    """Only the slow half is on the falling part of the friction curve."""
+    slow, fast = axis(), axis()
+    position = np.concatenate([0.1 * slow["position"], fast["position"]])
+    velocity = np.gradient(position, DT)
+    force = MASS * np.gradient(velocity, DT) + VISCOUS * velocity
+    force += np.sign(velocity) * (COULOMB + 3 * np.exp(-((velocity / 0.03) ** 2)))
+    force += 0.01 * np.random.default_rng(5).standard_normal(len(force))
+    assert not differing_halves.halves(inverse_model(record("both", DT, position=position, force=force), 5.0))
+
+
+def test_a_spring_driven_below_its_resonance_is_no_wrong_sign() -> None:
+    """The force goes with the position, as that of a negative mass does, but it also feeds friction."""
+    time = np.arange(8000) * DT
+    omega = 2 * np.pi * 5
+    position, velocity = 1e-3 * np.sin(omega * time), 1e-3 * omega * np.cos(omega * time)
+    force = 5e3 * position + 60 * velocity
+    assert inverse_model(record("bent", DT, position=position, force=force), 8.0).value("mass") < 0
+
+
 def test_a_log_that_changes_while_it_is_taken_says_so_and_its_intervals_hold_it_all() -> None:
     log = axis()
     assert changes_beside(inverse_model(log, 5.0)) is None

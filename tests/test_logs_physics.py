@@ -176,6 +176,16 @@ def test_a_command_that_switches_is_not_clipped() -> None:
     assert digit_of(np.round(wave)) == pytest.approx(1.0)
 
 
+def test_forces_commanded_in_round_numbers_are_no_coarse_digits() -> None:
+    """A dozen levels, all multiples of 0.1 N, each held for half a second."""
+    levels = np.array([1.2, -0.7, 2.0, 0.3, -1.9, 1.1, -0.4, 0.8, -1.5, 1.7, 0.5, -1.1])
+    assert digit_of(np.repeat(levels, 500)) == 0
+    slow = np.round(2 * np.sin(np.linspace(0, 6, 6000)), 1)
+    assert digit_of(slow) == pytest.approx(0.1)
+    encoder = np.round(30 * np.clip(np.sin(np.linspace(0, 6, 3000)), 0, 0.8) ** 2)
+    assert digit_of(encoder) == pytest.approx(1.0)
+
+
 def test_two_readings_are_asked(tmp_path: Path) -> None:
     """Two forces that explain the motion about as well: neither is offered, and both are named."""
     log = servo()

@@ -141,9 +141,12 @@ class FitCase(FittedCase):
     def may_name(self, doubt: str) -> bool:
         """Tell whether a doubt may name its effect as the cause of the residual.
 
-        A doubt may if its effect explains most of the residual, or if no effect does and no other cause has been named.
+        A doubt may if its effect explains most of the residual. If no effect does, it may if the residual is more than
+        noise, and no other cause has been named.
         """
-        return not self.has_cause if self.leading is None else self.leading.doubt == doubt
+        if self.leading is not None:
+            return self.leading.doubt == doubt
+        return self.quality.ratio > 1 and not self.has_cause
 
     @property
     def describes(self) -> bool:

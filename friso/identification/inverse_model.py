@@ -206,9 +206,10 @@ def inverse_model(
         _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
         for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
-    residual, power = np.linalg.norm(force - fitted), float(force @ velocity)  # the motor feeds friction
-    poor = residual > DoubtSettings.current().error_of_a_poor_model * np.linalg.norm(force)
-    if estimates[0].high < 0 and (power < 0 or not poor):
+    residual, size = np.linalg.norm(force - fitted), float(np.linalg.norm(force))
+    power = float(force @ velocity) / (size * float(np.linalg.norm(velocity)))  # the motor feeds friction
+    poor = residual > DoubtSettings.current().error_of_a_poor_model * size
+    if estimates[0].high < 0 and (power < 0 or (not poor and power < settings.power_share_of_friction)):
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
         raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)

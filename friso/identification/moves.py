@@ -115,7 +115,7 @@ def identify_moves(
     answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, between(progress, 0, FITTED))
     fit = answer.fit
     fitted = FittedCase(log, inverse, share, flat=flat, fit=fit, velocity=moved.velocity)
-    leading = None if fit.is_noise_of_motion(noise) else leading_effect(fitted)
+    leading = leading_effect(fitted) if fit.left > fit.problem.noise_left(noise) else None
     quality = quality_of(log, inverse, fit, noise, share, leading is not None)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, between(progress, FITTED, REPEATED))

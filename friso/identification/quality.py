@@ -30,12 +30,12 @@ class Quality:
     """Quality of a fit of moves, with reasons against trusting it.
 
     `noise` [N] is the noise of the record's force; `left` [N] the RMS residual over counted samples, and `noise_left`
-    [N] the residual expected of noise alone. `inverse_error` and `whole_error` are relative errors of the force: by the
-    inverse model, and by steady friction and mass of the whole model on the samples of the inverse model. `findings`
-    are the doubts raised. The whole model may be `rejected`, or nothing holds at all (`failed`). `without` has inverse
-    models of the log corrected for a cause. A record is `spoilt` if its fault passes for friction at low speed, and
-    `unsettled` if a large residual has no known cause. `seen` is true if the samples themselves show a cause, such as
-    clipping; no other effect is named then.
+    [N] the residual expected of noise, and of sensors that are not quite linear. `inverse_error` and `whole_error` are
+    relative errors of the force: by the inverse model, and by steady friction and mass of the whole model on the
+    samples of the inverse model. `findings` are the doubts raised. The whole model may be `rejected`, or nothing holds
+    at all (`failed`). `without` has inverse models of the log corrected for a cause. A record is `spoilt` if its fault
+    passes for friction at low speed, and `unsettled` if a large residual has no known cause. `seen` is true if the
+    samples themselves show a cause, such as clipping; no other effect is named then.
     """
 
     noise: float
@@ -98,11 +98,12 @@ def quality_of(
     beyond = inverse.error > settings.error_of_a_poor_model and left < settings.error_of_an_unsettled_record * force
     poor = inverse.error > settings.error_of_a_poor_model and not beyond
     reasons = causes(case) if plain.lacks_something or poor else []
+    better = settings.error_share_of_a_clearly_better_model * force
     if beyond:
-        share = settings.error_share_of_a_clearly_better_model * force
-        reasons = [cause for cause in reasons if cause.without is None or share * cause.without.error < left]
+        reasons = [cause for cause in reasons if cause.without is None or better * cause.without.error < left]
     worse = max(settings.error_ratio_of_a_contradiction * inverse.error, settings.error_of_a_fine_model)
-    rejected = not (beyond or poor) and plain.whole_error > worse and plain.lacks_something
+    contradicts = plain.whole_error > worse and left > better * inverse.error
+    rejected = plain.lacks_something and contradicts and not (beyond or poor)
     seen = any(cause.without is None and DOUBTS[cause.doubt].moment == "cause" for cause in reasons)
     named = [] if led and not (poor or seen) else reasons
     words = _verdict(plain, named, case.unit, poor, rejected, flat["friction.model"] == "none")

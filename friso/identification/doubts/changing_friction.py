@@ -67,7 +67,8 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
     if "friction.coulomb" not in fit.problem.names:
         return None
     forces, units, bends = changing_forces(fit, velocity)
-    return _drift(explained_by_forces(fit, forces, units), bends)
+    explained = explained_by_forces(fit, forces, units)
+    return _drift(explained, bends) if explained is not None and explained.sure(fit).any() else None
 
 
 def changing_forces(

@@ -29,7 +29,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(fit=further)
             return
         share = -float(np.expm1(-lighter))
-        words = _sentence(share) if case.may_name("coupling") else ""  # averaged motion looks like such a force
+        clear = explained.left <= DoubtSettings.current().power_left_by_an_effect and case.may_name("coupling")
+        words = _sentence(share) if clear else ""  # averaged motion looks like such a force
         yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 

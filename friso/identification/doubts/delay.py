@@ -17,12 +17,15 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
 
     A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
     turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. Only a stage that
-    follows the log is examined. In slow motion a delay cannot be told from friction at the reversals, and is not named.
+    follows the log is examined. In slow motion a delay cannot be told from friction at the reversals, and is not named;
+    nor is it if it leaves much of the residual, as a coarse encoder's does.
     """
+    settings = DoubtSettings.current()
     for tried, explained in case.explained(forces):
         late, words = -float(explained.sizes[0]), ""
-        long = abs(late) >= DoubtSettings.current().samples_of_a_delay * case.log.sample_time
-        if long and case.may_name("delay") and is_sure_beside_all(case.fit, tried.forces, tried.units):
+        long = abs(late) >= settings.samples_of_a_delay * case.log.sample_time
+        clear = long and explained.left <= settings.power_left_by_a_delay
+        if clear and case.may_name("delay") and is_sure_beside_all(case.fit, tried.forces, tried.units):
             words = (
                 f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a "
                 "delay of the drive or between the channels, which passes for damping and viscous friction; the "

@@ -47,15 +47,20 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 def halves(inverse: InverseModel) -> list[Half]:
     """List the mass and frictions of an inverse model that differ between the record's halves.
 
-    They differ by more than chance, given the deviations of both.
+    They differ by more than chance, given the deviations of both. Halves that move at very different speeds or
+    accelerations are not compared, because friction is then read from different parts of its curve.
     """
-    fits = []
-    for part in np.array_split(np.arange(len(inverse.measured)), 2):
+    settings, fits = DoubtSettings.current(), []
+    parts = np.array_split(np.arange(len(inverse.measured)), 2)
+    sizes = np.array([np.linalg.norm(inverse.columns[part, :2], axis=0) / np.sqrt(len(part)) for part in parts])
+    if (sizes.max(axis=0) > settings.ratio_of_comparable_halves * sizes.min(axis=0)).any():
+        return []
+    for part in parts:
         columns, force = inverse.columns[part], inverse.measured[part]
         solution, left = least_squares(columns, force)
         fits.append((solution, np.sqrt(np.diag(spread_of(columns, left)))))
     values, off = (np.array(rows) for rows in zip(*fits, strict=True))
-    apart = np.abs(values[0] - values[1]) > DoubtSettings.current().deviations_of_differing_halves * np.hypot(*off)
+    apart = np.abs(values[0] - values[1]) > settings.deviations_of_differing_halves * np.hypot(*off)
     low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
     return [
         Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))

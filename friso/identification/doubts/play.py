@@ -18,8 +18,9 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
-    If the widest play that is tried explains most, something slower is the cause; if the play is as narrow as the steps
-    of the position, they may be it. No play is named then, but the intervals are widened.
+    If the widest play that is tried explains most, something slower is the cause; if the narrowest does, something
+    quicker, such as bristles. If the play is as narrow as the steps of the position, they may be it. No play is named
+    then, but the intervals are widened.
     """
     settings, effect = DoubtSettings.current(), case.led_by("play")
     if effect is None:
@@ -35,7 +36,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         "and the intervals of the rest allow for it; a dial gauge on the load while the motor turns to and fro shows it"
     )
     named, digit = case.named(effect, words, width, "m"), digit_of(case.log["position"][case.log.longest])
-    unsure = np.isclose(width, max(settings.plays_tried)) or width < settings.digits_of_a_play * digit
+    unsure = np.isclose(width, settings.plays_tried).any() or width < settings.digits_of_a_play * digit
     yield replace(named, words="", explains=False) if unsure else named
 
 

@@ -29,17 +29,18 @@ class ExplainedResidual:
     rest: np.ndarray
     slopes: np.ndarray
 
-    def is_sure(self, fit: OutputErrorFit) -> bool:
-        """Tell whether the last additional force is present: its size is not 0 within its error.
+    def sure(self, fit: OutputErrorFit) -> np.ndarray:
+        """Tell for each additional force, shape (forces,), whether it is present: its size is not 0 within its error.
 
         The error allows for residuals that repeat at every reversal. With a slow sine, a coupling or a delay cannot
         then be told from slightly different friction.
         """
         size = np.linalg.norm(self.slopes, axis=0)
         usable = np.isfinite(size) & (size > 0)
-        variance = spread_along(fit.problem, self.slopes[:, usable], self.rest)[-1, -1]
+        covariance = spread_along(fit.problem, self.slopes[:, usable], self.rest)
         chance = 1 - OutputErrorSettings.current().probability_of_an_effect
-        return bool(np.abs(self.sizes[-1]) > norm.isf(chance / 2) * np.sqrt(variance))
+        deviations = np.sqrt(np.diag(covariance)[-len(self.sizes) :])
+        return np.abs(self.sizes) > norm.isf(chance / 2) * deviations
 
 
 def explained_by_forces(
@@ -88,7 +89,7 @@ def is_sure_beside_all(fit: OutputErrorFit, forces: Sequence[np.ndarray], units:
     """
     rest, slopes = beside_all_numbers(fit)
     explained = explained_by(slopes, rest, effects_of(forces, units, fit), fit.problem.counted)
-    return explained is not None and explained.is_sure(fit)
+    return explained is not None and bool(explained.sure(fit)[-1])
 
 
 def beside_all_numbers(fit: OutputErrorFit) -> tuple[np.ndarray, np.ndarray]:

@@ -187,8 +187,9 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     """Spread many starts over the ranges of the free parameters, beginning with `first`.
 
     The result has the shape (starts, parameters). Wide starts are needed for parameters that only some motions show.
-    Parameters that any motion shows start near the inverse model's values, because a first fit of them alone to
-    stick-slip motion can end anywhere.
+    Parameters that any motion shows keep their values of `first` in one half of the starts, because errors of mass and
+    friction would hide which of the others is best. In the other half they start near the inverse model's values,
+    because a first fit of them alone to stick-slip motion can end anywhere.
     """
     settings = OutputErrorSettings.current()
     low, high = bounds_of(problem)
@@ -204,6 +205,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     )
     shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
+    starts[::2] = np.where(core, first, starts[::2])
     return np.vstack([first, starts])
 
 

@@ -86,7 +86,7 @@ def fit_identifiable(
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
     part = between(progress, ALONG, AGAIN_LOOP, "moves: the closed loop from there")
-    best = min((fit(loop, along.fit.free, starts, part), *explaining), key=lambda one: one.cost)
+    best = min((fit(loop, along.fit.free, starts, part), *explaining), key=_cost)
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
     if best.explains(noise, closely=True):
@@ -113,6 +113,9 @@ def _identifiable_on_log(
     full = fit(follows, numbers, everywhere(follows, numbers, plain.inner), part)
     between(progress, FITTED, SETTLED)(0, 0, "moves: what happens between the samples")
     full = with_force_settled(with_smoothness_settled(full), noise)
+    if not full.explains(noise):  # with mass and friction known better, another optimum may show
+        part = between(progress, FITTED, SETTLED, "moves: all parameters once more")
+        full = min(full, fit(full.problem, numbers, everywhere(full.problem, numbers, full.inner), part), key=_cost)
     answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
@@ -155,6 +158,11 @@ def believed(
             full, profiles = polished(full.problem, full.free, fits.inner[np.argmin(fits.cost)]), {}
     shown = {name for name, seen in profiles.items() if _sharp(full, seen)}
     return IdentifiableFit(full, profiles, frozenset(_complete(shown, {*names} - core)))
+
+
+def _cost(fit: OutputErrorFit) -> float:
+    """Return the mean square of a fit's residual [N^2]."""
+    return fit.cost
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:

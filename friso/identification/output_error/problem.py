@@ -22,6 +22,7 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
 from friso.identification.output_error.settings import OutputErrorSettings
 from friso.identification.readings.common import noise_of, robust
+from friso.identification.readings.settings import ReadingSettings
 from friso.identification.settings import IdentificationSettings
 from friso.stage.controllers import CONTROLLER
 
@@ -85,13 +86,15 @@ class Problem:
         """Return the RMS residual [N] that noise alone leaves, if the force has this `noise` [N].
 
         In closed loop the residual is the noise itself. For a stage that follows the log, the guiding controller passes
-        only slow noise. The controller's response to position noise is added.
+        only slow noise. The controller's response to position noise is added, and so is the error of a force sensor
+        that is not quite linear.
         """
         if self.closed:
             return noise
-        omega = 2 * self.flat[KP] / self.flat[KD]
-        passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
-        return float(np.hypot(noise * passes, self.shaking[0]))
+        passed = noise * _passes(2 * self.flat[KP] / self.flat[KD], self.inputs.sample_time)
+        force = np.sqrt(np.mean(self.inputs.force[self.counted > 0] ** 2))
+        linear = ReadingSettings.current().linearity_of_sensors * force
+        return float(np.linalg.norm([passed, self.shaking[0], linear]))
 
     def held_to(self, level: int) -> Problem:
         """Return the problem with the stage driven along one of the `sharper` positions, by number.
@@ -300,8 +303,8 @@ def tracking(
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
     if not counted.any():
         actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
-        expected = "moves that last longer: is the time, or the position, in another unit?"
-        raise InputError("position", actual, expected, '--unit TIME="ms"', log.name)
+        expected = "moves that last longer: is a unit another one, or does the body swing without sliding?"
+        raise InputError("position", actual, expected, '--unit TIME="ms", or --as presliding', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
     held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
@@ -316,23 +319,29 @@ def tracking(
         counted * log.measured(part),
         (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
         tuple(sharper),
-        tuple(2 * mass * omega * _shaking(log, part, cutoff) for cutoff in cutoffs),
+        tuple(_shaking(log, part, 2 * mass * omega, omega, cutoff) for cutoff in cutoffs),
         tuple(cutoffs),
     )
 
 
-def _shaking(log: Log, part: slice, cutoff: float) -> float:
-    """Return the velocity noise [m/s] below `cutoff` [Hz] that matters beside the force noise.
+def _passes(omega: float, sample_time: float) -> float:
+    """Return the fraction of a force's noise that a guiding controller of frequency `omega` [rad/s] passes."""
+    return min(1.0, float(np.sqrt(2 * PASSES * omega * sample_time)))
 
-    Noise counts if the velocity was integrated, since it accumulates in the position, or if the force is a command
-    without noise of its own. Otherwise the result is 0.
+
+def _shaking(log: Log, part: slice, damping: float, omega: float, cutoff: float) -> float:
+    """Return the noise [N] of a guiding controller's force due to noise of the motion below `cutoff` [Hz].
+
+    The controller has a `damping` [N s/m] and the frequency `omega` [rad/s]. Noise of a velocity that was integrated
+    always counts, since it accumulates in the position. Noise of a position counts if it exceeds that of the force;
+    otherwise the result is 0.
     """
     band = min(cutoff, 0.5 / log.sample_time)
     if log.is_integrated:
-        return float(noise_of(log["velocity"][part]) * np.sqrt(2 * band * log.sample_time))
-    if noise_of(log["force"][part]) > 0:
-        return 0.0
-    return float(noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3))
+        return damping * float(noise_of(log["velocity"][part]) * np.sqrt(2 * band * log.sample_time))
+    velocity = noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3)
+    force = noise_of(log["force"][part]) * _passes(omega, log.sample_time)
+    return damping * float(velocity) if damping * velocity > force else 0.0
 
 
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:

@@ -176,21 +176,24 @@ def digit_of(signal: np.ndarray) -> float:
     """Return the resolution of a signal, shape (n,); 0 if it has none.
 
     The resolution is the common step of the levels at which the signal stays (interpolation does not change it), else
-    the smallest step. A signal that mostly stays at a few levels is a stepped command and has no resolution.
+    the smallest step. A stepped command has no resolution: it mostly stays at a few levels, or at levels that it
+    reaches by single jumps of several common steps.
     """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
     dust = settings.rounding_of_a_signal * np.abs(signal).max(initial=0.0)
-    stays = np.sort(signal[1:][steps <= dust])
+    changes = steps > dust
+    real, stays = steps[changes], np.sort(signal[1:][~changes])
     apart = np.diff(stays)
     apart = apart[apart > dust]
     if apart.size >= settings.levels_of_a_digit:
         digits = apart / apart.min()
         if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
-            return float(apart.min())
+            single = np.count_nonzero(changes[1:] & changes[:-1]) < settings.share_of_long_changes * real.size
+            stepped = single and np.median(real) > settings.digits_of_a_commanded_step * apart.min()
+            return 0.0 if stepped else float(apart.min())
     elif stays.size > steps.size / 2:
         return 0.0
-    real = steps[steps > dust]
     return float(real.min()) if real.size else 0.0
 
 

@@ -76,7 +76,9 @@ def friction_velocity(log: Log, mass: float | None = None, exponent: float | Non
     moved, off = _mass(log) if mass is None else (mass, 0.0)
     velocities, forces, errors, swings = np.array([_row(stretch, moved, off) for stretch in used]).reshape(-1, 4).T
     size = np.abs(forces)
-    errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
+    if used:
+        linear = np.full_like(size, ReadingSettings.current().linearity_of_sensors * size.max())
+        errors = np.linalg.norm([errors, linear, swings**2 * np.ptp(size)], axis=0)
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
         words: _direction(velocities[m], np.sign(velocities[m]) * forces[m], errors[m], words, exponent)
@@ -155,13 +157,12 @@ def _together(
     return Estimate(name, "N", value, low, high, method), both, both.curve.refuted
 
 
-def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return standard deviations [N] of the forces from half-widths, at least their median.
+def _deviations(errors: np.ndarray) -> np.ndarray:
+    """Return standard deviations [N] of forces from half-widths, at least their median.
 
     A stretch whose velocity swings counts less; a stretch that happens to be very even counts no more than others.
     """
-    least = max(float(np.median(errors)), ReadingSettings.current().rounding_of_a_force * float(np.abs(forces).max()))
-    return np.maximum(errors, least) / COVERAGE
+    return np.maximum(errors, float(np.median(errors))) / COVERAGE
 
 
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -170,7 +171,7 @@ def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple
     Returns solution, covariance and degrees of freedom. Friction varies from place to place, and all stretches lie over
     the same places, so errors of the level of friction do not average out.
     """
-    deviations = _deviations(forces, errors)
+    deviations = _deviations(errors)
     inverse = np.linalg.pinv(design / deviations[:, None]) / deviations
     solution = inverse @ forces
     freedom = len(forces) - design.shape[1]
@@ -241,7 +242,7 @@ def _direction(
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
     if freedom >= settings.speeds_of_a_line and distinct(speeds) >= settings.speeds_of_a_curve:
-        deviations = _deviations(friction, errors)
+        deviations = _deviations(errors)
         plain = float(np.sum(((friction - solution[0] - solution[1] * speeds) / deviations) ** 2))
         forces = Forces(speeds, friction, np.sign(velocities), deviations, _level(deviations, errors), spent > 0)
         curve = stribeck_fit(forces, plain, exponent)
@@ -251,8 +252,9 @@ def _direction(
         return _still_falling(coulomb, viscous, f"from {low:.3g} to {high:.3g} mm/s friction falls with the speed")
     flat = f"{slowest}: no rise of friction towards rest shows"
     static = Estimate.unknown("friction.static", "N", method, flat, coulomb.low)
-    speed = Estimate.unknown("friction.stribeck_velocity", "m/s", method, static.reason, 0.0, float(speeds.min()))
-    exponent_open = replace(_nothing(flat).stribeck_exponent, method=method)
+    speed, exponent_open = (
+        replace(one, method=method) for one in (_nothing(flat).stribeck_velocity, _nothing(flat).stribeck_exponent)
+    )
     return Direction(coulomb, viscous, static, speed, exponent_open, covariance)
 
 
@@ -299,7 +301,8 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
 
     Any exponent counts that the forces leave open. Static friction and Stribeck velocity are determined only if speeds
     reach below the Stribeck velocity. If friction may still fall at the highest speed, nothing is determined, except
-    perhaps the exponent.
+    perhaps the exponent, and static friction and Stribeck velocity have no range: what still falls at the highest speed
+    may be another effect than Stribeck's.
     """
     velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
     if exponent is not None and not curve.refuted:
@@ -308,13 +311,13 @@ def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: fl
     rises = f"friction rises towards rest, but no steady motion below {speeds.min() * 1e3:.3g} mm/s shows how far"
     falls = f"friction may still fall with the speed at {speeds.max() * 1e3:.3g} mm/s"
     seen = velocity.closed and velocity.value >= speeds.min() and velocity.high - velocity.low < 2 * velocity.value
-    high = "" if curve.coulomb.closed else falls
-    low = high or ("" if seen else rises)
+    high, low = "" if curve.coulomb.closed else falls, "" if seen else rises
+    nothing = _nothing(falls)
     return Direction(
         _ranged("coulomb", "N", curve.coulomb, method, high),
         _ranged("viscous", "N s/m", curve.viscous, method, high),
-        _ranged("static", "N", curve.static, method, low),
-        _ranged("stribeck_velocity", "m/s", velocity, method, low),
+        nothing.static if high else _ranged("static", "N", curve.static, method, low),
+        nothing.stribeck_velocity if high else _ranged("stribeck_velocity", "m/s", velocity, method, low),
         _ranged("stribeck_exponent", "", curve.exponent, method, "" if curve.exponent.closed else several),
         curve.covariance,
         curve,

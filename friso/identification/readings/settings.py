@@ -58,6 +58,13 @@ class ReadingSettings(Settings):
     error_of_a_digit: float = setting(0.1, "")
     """Largest distance of levels from multiples of the resolution, relative to it."""
 
+    share_of_long_changes: float = setting(0.1, "")
+    """Largest fraction of the changes of a stepped command that last for more than one sample."""
+
+    digits_of_a_commanded_step: float = setting(1.5, "")
+    """Smallest usual jump of a stepped command, in common steps of its levels. A rounded signal that changes in single
+    jumps is slow, and changes by one step."""
+
     power_of_clear_motion: float = setting(100.0, "")
     """Smallest power of visible motion, relative to the noise. Less occurs by chance among many spectral lines."""
 
@@ -138,9 +145,6 @@ class ReadingSettings(Settings):
 
     speeds_of_a_line: int = setting(3, "")
     """Fewest distinct speeds that show a deviation from a straight line."""
-
-    rounding_of_a_force: float = setting(1e-9, "")
-    """Smallest error of a mean, relative to the largest force."""
 
     # Loads of a joint between slips.
     fewest_loads: int = setting(3, "")

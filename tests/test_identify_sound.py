@@ -1,0 +1,39 @@
+"""Sound logs of an independent simulator, without noise of the force: no effect is named, and intervals hold the truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.identify_effects import KEYS, Effects, simulated
+
+from friso.identification.experiments.moves import KIND
+from friso.identification.kind import NOTHING_CHOSEN, Prior
+
+HEAVY = {
+    "mass": 14.8, "coulomb": 91.2, "static": 159.0, "stribeck": 3.26e-3, "viscous": 241.0, "bristle": 5.93e6,
+    "top": 0.1, "crossover": 20.0, "position_noise": 0.0, "force_noise": 0.0,
+}  # fmt: skip
+"""A machine with much stiction, whose steady friction alone describes its moves badly [SI]."""
+
+LIGHT = {
+    **HEAVY, "mass": 2.38, "coulomb": 5.0, "static": 8.11, "stribeck": 1.61e-3, "viscous": 6.86, "bristle": 6.96e5,
+    "crossover": 12.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("machine", "digit"), [(HEAVY, 0.0), (HEAVY, 1e-6), (LIGHT, 5e-6), (LIGHT, 1e-5)], ids=["0", "1um", "5um", "10um"]
+)
+def test_a_sound_log_raises_no_doubt(machine: dict[str, float], digit: float) -> None:
+    """Digits of an encoder, and errors within the linearity of sensors, are no effects outside the model."""
+    log = simulated(Effects(**machine), np.random.default_rng(1))
+    position = np.round(log["position"] / digit) * digit if digit else log["position"]
+    log = replace(log, signals={**log.signals, "position": position})
+    moves = KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN)
+    assert not moves.quality.doubts
+    assert not moves.quality.rejected
+    reported = [estimate for estimate in moves.estimates if estimate.determined and estimate.name in KEYS]
+    assert {"masses.cart", "friction.coulomb", "friction.viscous"} <= {estimate.name for estimate in reported}
+    assert all(estimate.holds(machine[KEYS[estimate.name]]) for estimate in reported)
