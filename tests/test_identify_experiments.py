@@ -597,7 +597,7 @@ def test_friction_velocity_map_without_slow_speeds(wording: Wording) -> None:
 
 
 def exact(speeds: list[float], friction: Callable[[float], float]) -> Log:
-    """Return a log of travel there and back over 0.1 m at each speed [m/s], with exactly the friction [N] of the speed."""
+    """Return a log of travel there and back over 0.1 m at each speed [m/s], with exactly the friction [N] at it."""
     rows = []
     for speed in speeds:
         leg = np.linspace(0, 0.1, int(0.1 / speed / DT))

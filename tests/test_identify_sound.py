@@ -1,4 +1,4 @@
-"""Sound logs of an independent simulator, without noise of the force: no effect is named, and intervals hold the truth."""
+"""Sound logs of an independent simulator, without noise of the force: nothing is named, and intervals hold the truth."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.identify_effects import KEYS, Effects, simulated
 
+from benchmarks.identify_effects import KEYS, Effects, simulated
 from friso.identification.experiments.moves import KIND
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 
