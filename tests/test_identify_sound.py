@@ -1,4 +1,4 @@
-"""Sound logs of an independent simulator, without noise of the force: nothing is named, and intervals hold the truth."""
+"""Sound logs of an independent simulator, without noise of the force: no doubt is raised, intervals hold the truth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.identify_effects import KEYS, Effects, simulated
+from benchmarks.identify_effects import KEYS, Effects, plain, simulated
+from friso.identification.doubts import decaying_damping
 from friso.identification.experiments.moves import KIND
 from friso.identification.kind import NOTHING_CHOSEN, Prior
 
@@ -37,3 +38,16 @@ def test_a_sound_log_raises_no_doubt(machine: dict[str, float], digit: float) ->
     reported = [estimate for estimate in moves.estimates if estimate.determined and estimate.name in KEYS]
     assert {"masses.cart", "friction.coulomb", "friction.viscous"} <= {estimate.name for estimate in reported}
     assert all(estimate.holds(machine[KEYS[estimate.name]]) for estimate in reported)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("falls", [0.0, 1.0])
+def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, falls: float) -> None:
+    """They would come out too stiff; with constant damping, as in the model, they are told."""
+    rng = np.random.default_rng((seed, 56))
+    machine = {**plain(rng), "damping_falls": falls}
+    log = simulated(Effects(**machine), rng)
+    moves = KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN)
+    (stiffness,) = (estimate for estimate in moves.estimates if estimate.name == "friction.bristle_stiffness")
+    assert stiffness.determined == (falls == 0)
+    assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
