@@ -14,6 +14,9 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import BRISTLES, is_free
 from friso.identification.settings import DoubtSettings
 
+SLOW_FRICTION = ("friction.static", "friction.stribeck_velocity", "friction.stribeck_exponent")
+"""Keys of friction at low speed, which a fit that leaves much can trade for what the model lacks."""
+
 NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
 """Reason given where nothing is reported from a fit."""
 
@@ -42,6 +45,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
     elif not is_free(case.flat):
         case = case.with_answers(RaisedDoubt(answers=_with_model_error(case)))
     imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
+    imitated |= dict.fromkeys(SLOW_FRICTION, IMITATED) if quality.lacks_something else {}
     case = case.with_answers(RaisedDoubt(refuses={**case.refused, **imitated}))
     if is_free(case.flat):
         return case

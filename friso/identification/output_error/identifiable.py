@@ -113,9 +113,11 @@ def _identifiable_on_log(
     full = fit(follows, numbers, everywhere(follows, numbers, plain.inner), part)
     between(progress, FITTED, SETTLED)(0, 0, "moves: what happens between the samples")
     full = with_force_settled(with_smoothness_settled(full), noise)
-    if not full.explains(noise):  # with mass and friction known better, another optimum may show
-        part = between(progress, FITTED, SETTLED, "moves: all parameters once more")
-        full = min(full, fit(full.problem, numbers, everywhere(full.problem, numbers, full.inner), part), key=_cost)
+    again, part = not full.explains(noise), between(progress, FITTED, SETTLED, "moves: all parameters once more")
+    while again:  # with mass and friction known better, another optimum may show
+        other = fit(full.problem, numbers, everywhere(full.problem, numbers, full.inner), part)
+        again = other.cost < OutputErrorSettings.current().cost_share_of_another_optimum * full.cost
+        full = min(full, other, key=_cost)
     answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)

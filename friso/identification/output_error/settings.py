@@ -48,6 +48,10 @@ class OutputErrorSettings(Settings):
     """Relative decrease of the sum of squares per iteration at which the best fit ends. Larger values stop too
     early."""
 
+    cost_share_of_another_optimum: float = setting(0.9, "")
+    """Ratio of a new fit's sum of squares to the last one's below which it counts as another optimum, and a further
+    search may pay."""
+
     starts_near_a_fit: int = setting(127, "")
     """Number of starts around an earlier fit, needed because the closed loop of a hunting stage has other optima."""
 

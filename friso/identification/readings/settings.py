@@ -90,7 +90,7 @@ class ReadingSettings(Settings):
     variance_share_of_a_spring: float = setting(0.99, "")
     """Smallest fraction of the force's variance between rests that position must explain for a spring to act."""
 
-    variance_share_of_bristles: float = setting(0.5, "")
+    variance_share_of_bristles: float = setting(0.25, "")
     """Smallest fraction of the force's variance that the position must explain before a fit of bristles is tried."""
 
     places_of_a_spring: int = setting(4, "")

@@ -80,7 +80,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     """Say what is identified, with doubts, and what is not; each sentence has a colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
-    effects = [estimate for estimate in visible if not _absent(estimate)]
+    effects = [estimate for estimate in visible if not estimate.low <= 0 <= estimate.high]
     headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
     bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
@@ -97,9 +97,10 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
         lines.append((VERMILLION, "These logs determine no key of the stage file."))
     lines += [(GREEN, sentence) for sentence in headlines]
     lines += [] if first else doubts
-    if len(effects) < len(visible):
-        absent = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in visible if _absent(one))
-        lines.append((GREEN, f"None found: {absent}."))
+    nothing = [estimate for estimate in visible if estimate not in effects]
+    for colour, words, absent in ((GREEN, "None found", True), (ORANGE, "Perhaps none", False)):
+        some = [f"{within(one.name)} ({interval_text(one)})" for one in nothing if (one.name in ABSENT) == absent]
+        lines += [(colour, f"{words}: {', '.join(some)}.")] if some else []
     if identification.stage is None and (estimates or not headlines):
         lines.append((ORANGE, _why_no_stage(identification)))
     if len(visible) < len(estimates):
@@ -127,11 +128,6 @@ def _why_no_stage(identification: Identification) -> str:
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 """Keys that are usually 0; an interval that contains 0 shows no effect."""
-
-
-def _absent(estimate: Estimate) -> bool:
-    """Tell whether an estimate is one of a bias or of viscous asymmetry, and may be zero."""
-    return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
