@@ -38,7 +38,8 @@ class Effects:
 
     Lengths are in m, forces in N, times in s. `load` is the fraction of the mass behind the measured position, on a
     spring of `stiffness` with `play`; friction acts on the motor's side, or `on_load`. Bristle damping falls with the
-    speed as the Stribeck effect does, to the power `damping_falls`; 0 makes it constant.
+    speed as the Stribeck effect does, to the power `damping_falls`; 0 makes it constant. It is `damping_at_rest` times
+    half of the critical one at rest.
     """
 
     mass: float
@@ -71,6 +72,7 @@ class Effects:
     with_reference: float = 0.0
     sign: float = 1.0
     damping_falls: float = 1.0
+    damping_at_rest: float = 1.0
 
 
 @njit(cache=True)
@@ -88,7 +90,7 @@ def _run(reference, speed, p, step, parts):
     carried = mass * load
     x = v = y = w = z = total = 0.0
     last = 0.0
-    bristle_damping = np.sqrt(bristle * mass)
+    bristle_damping = p[23] * np.sqrt(bristle * mass)
     for k in range(n):
         position[k] = x
         error = reference[k] - x
@@ -140,6 +142,7 @@ def simulated(machine: Effects, rng: np.random.Generator) -> Log:
         machine.load_friction, machine.by_place, machine.cogging, machine.pitch, machine.load, machine.stiffness,
         machine.damping, machine.play, machine.most, machine.gain_after, machine.on_load,
         machine.gain_fast, machine.gain_beyond, machine.damping_falls,
+        machine.damping_at_rest,
     ])  # fmt: skip
     position, force = _run(reference, wanted, numbers, STEP, PARTS)
     late = machine.late + (machine.late_at_end - machine.late) * clock / TIME if machine.late_at_end else machine.late

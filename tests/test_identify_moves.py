@@ -258,8 +258,13 @@ def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, Identifie
         assert np.all((starts[:, free] >= low[free] - 1e-9) & (starts[:, free] <= high[free] + 1e-9))
         assert np.ptp(starts[:, result.free[0]]) > 0
     core = [i for i, parameter in enumerate(result.problem.parameters) if parameter.core]
-    kept = np.all(everywhere(result.problem, tuple(every), result.inner)[:, core] == result.inner[core], axis=1)
+    around = everywhere(result.problem, tuple(every), result.inner)[:, core]
+    kept = np.all(around == result.inner[core], axis=1)
     assert kept.mean() == pytest.approx(0.5, abs=0.01)  # where errors of mass and friction hide nothing
+    middle = around[~kept].mean(axis=0)
+    above = np.mean(around[~kept] > middle, axis=0)
+    assert np.ptp(around[~kept], axis=0) == pytest.approx(np.ptp(around, axis=0), rel=0.1)
+    assert above == pytest.approx(0.5, abs=0.05)
 
 
 def test_without_noise_the_fit_ends_at_the_truth() -> None:

@@ -51,3 +51,13 @@ def test_bristles_are_refused_if_their_damping_falls_with_the_speed(seed: int, f
     (stiffness,) = (estimate for estimate in moves.estimates if estimate.name == "friction.bristle_stiffness")
     assert stiffness.determined == (falls == 0)
     assert stiffness.reason == decaying_damping.WHY if falls else stiffness.holds(machine["bristle"])
+
+
+def test_a_constant_force_hides_no_effect() -> None:
+    """Cogging of an eighth of Coulomb friction shows, though the axis carries 120 times as much."""
+    rng = np.random.default_rng((1, 56))
+    machine = plain(rng)
+    log = simulated(Effects(**machine, cogging=machine["coulomb"] / 8), rng)
+    carried = log["force"] + 120 * machine["coulomb"]
+    log = replace(log, signals={**log.signals, "force": carried})
+    assert KIND.analyse([log], Prior(KIND.around(log) if KIND.around else None), NOTHING_CHOSEN).quality.doubts

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from friso.identification.quality import Quality
 
 IMITATED = "what the model lacks would pass for it"
-"""Reason for not reporting bristles: effects that the model lacks may look like them."""
+"""Reason for not reporting bristles or friction at low speed: effects that the model lacks may look like them."""
 
 Moment = Literal["record", "fault", "cause", "otherwise", "value", "fit", "curve", "key", "response", "stage", "laws"]
 """Moment of an analysis at which a doubt is examined, which decides the argument of `find`.

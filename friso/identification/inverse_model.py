@@ -207,9 +207,9 @@ def inverse_model(
         for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
     residual, size = np.linalg.norm(force - fitted), float(np.linalg.norm(force))
-    power = float(force @ velocity) / (size * float(np.linalg.norm(velocity)))  # the motor feeds friction
+    power, little = float(force @ velocity), settings.power_share_of_friction * size * float(np.linalg.norm(velocity))
     poor = residual > DoubtSettings.current().error_of_a_poor_model * size
-    if estimates[0].high < 0 and (power < 0 or (not poor and power < settings.power_share_of_friction)):
+    if estimates[0].high < 0 and (power < 0 or (not poor and power < little)):  # the motor feeds friction
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
         raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)

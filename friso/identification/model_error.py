@@ -46,7 +46,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
         case = case.with_answers(RaisedDoubt(answers=_with_model_error(case)))
     imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
     imitated |= dict.fromkeys(SLOW_FRICTION, IMITATED) if quality.lacks_something else {}
-    case = case.with_answers(RaisedDoubt(refuses={**case.refused, **imitated}))
+    case = case.with_answers(RaisedDoubt(refuses={**imitated, **case.refused}))
     if is_free(case.flat):
         return case
     case = case.with_answers(RaisedDoubt(answers=_with_causes(case), refuses=_imitated_by_causes(case)))

@@ -58,7 +58,7 @@ class Quality:
 
     @property
     def ratio(self) -> float:
-        """Return the ratio of the residual to the residual of noise alone."""
+        """Return the ratio of the residual to the residual of the sensors' errors alone."""
         return self.left / self.noise_left if self.noise_left > 0 else np.inf
 
     @property

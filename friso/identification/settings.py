@@ -75,7 +75,8 @@ class DoubtSettings(Settings):
     """Residual, relative to the force, of both the fit and the best cause above which intervals are widened."""
 
     error_share_of_a_clearly_better_model: float = setting(0.5, "")
-    """Ratio of the whole model's error to the best cause's error below which no cause is named."""
+    """Ratio of the whole model's error to the best cause's, or the inverse model's, below which no cause is named, and
+    the whole model is not rejected."""
 
     error_ratio_of_a_contradiction: float = setting(1.5, "")
     """Ratio of the whole model's error to the inverse model's above which it contradicts the log."""
@@ -134,6 +135,10 @@ class DoubtSettings(Settings):
 
     digits_of_a_play: float = setting(5.0, "")
     """Smallest width of a play that can be named, in steps of the position."""
+
+    falling_dampings: tuple[float, ...] = setting((0.3, 1.0, 3.0), "")
+    """Dampings at rest of bristles whose damping falls with the speed, relative to half of the critical damping of the
+    mass on them."""
 
     stiffer_bristles: tuple[float, ...] = setting((4.0, 8.0, 16.0), "")
     """Stiffnesses of bristles that are tried beside the fitted one, relative to it."""

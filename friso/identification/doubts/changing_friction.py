@@ -24,7 +24,8 @@ class RecordDrift:
     """How friction and a constant force change during a record, and what that shifts.
 
     `moved`, shape (free,), is the shift of the fitted numbers. `friction` and `constant` [N] are the changes over the
-    record. `friction_reach` and `constant_reach` [N] are the largest deviations from the mean over the record.
+    record. `friction_reach` and `constant_reach` [N] are the largest deviations from the mean over the record. The
+    changes are not `sure` if each of them may be 0, so that friction and constant force cannot be told apart.
     """
 
     moved: np.ndarray
@@ -32,10 +33,14 @@ class RecordDrift:
     constant: float
     friction_reach: float
     constant_reach: float
+    sure: bool = True
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
-    """Fit changes of friction and of the constant force to the residual force."""
+    """Fit changes of friction and of the constant force to the residual force.
+
+    Intervals reach over all changes; sure ones are named.
+    """
     inverse, quality = case.inverse, case.quality
     changes = None
     if not quality.failed:
@@ -50,7 +55,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
         ("Friction", changes.friction, "warming up?"),
         ("The constant force", changes.constant, "a drift of the force?"),
     ):
-        if size > DoubtSettings.current().friction_share_of_a_change * case.inverse.value("coulomb"):
+        if changes.sure and size > DoubtSettings.current().friction_share_of_a_change * case.inverse.value("coulomb"):
             words = (
                 f"{what} changes by {size:.2g} {case.unit} during the record ({cause}): intervals reach from its least "
                 "to its largest"
@@ -68,7 +73,8 @@ def _changes_of_fit(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | 
         return None
     forces, units, bends = changing_forces(fit, velocity)
     explained = explained_by_forces(fit, forces, units)
-    return _drift(explained, bends) if explained is not None and explained.sure(fit).any() else None
+    drift = _drift(explained, bends)
+    return drift and replace(drift, sure=explained is not None and bool(explained.sure(fit).any()))
 
 
 def changing_forces(

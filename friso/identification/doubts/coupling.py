@@ -20,7 +20,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     If the motor's position is measured, a load m on a coupling of natural frequency w seems to weigh m / (1 + s^2 /
     w^2) in motion exp(s t): well below w, its force lacks m / w^2 times the second derivative of the acceleration. If
     the position of the load is measured, the force that moves a mass M before the coupling is greater by M / w^2 times
-    that derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then.
+    that derivative. At the reversals of a slow motion, friction may do the same: no coupling is named then, nor if it
+    explains little.
     """
     fit = case.fit
     for tried, explained in case.explained(forces) if not is_free(case.flat) else ():
@@ -29,8 +30,8 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
             yield RaisedDoubt(fit=further)
             return
         share = -float(np.expm1(-lighter))
-        clear = explained.left <= DoubtSettings.current().power_left_by_an_effect and case.may_name("coupling")
-        words = _sentence(share) if clear else ""  # averaged motion looks like such a force
+        clear = case.leading is not None or explained.left <= DoubtSettings.current().power_left_by_an_effect
+        words = _sentence(share) if clear and case.may_name("coupling") else ""  # averaged motion looks like that, too
         yield RaisedDoubt(words, share, fit=further, refuses=dict.fromkeys(BRISTLES, IMITATED))
 
 

@@ -47,14 +47,13 @@ def find(case: ValueCase) -> Iterator[RaisedDoubt]:
 def halves(inverse: InverseModel) -> list[Half]:
     """List the mass and frictions of an inverse model that differ between the record's halves.
 
-    They differ by more than chance, given the deviations of both. Halves that move at very different speeds or
-    accelerations are not compared, because friction is then read from different parts of its curve.
+    They differ by more than chance, given the deviations of both. Friction is not compared between halves that move at
+    very different speeds, which show different parts of its curve, nor mass at very different accelerations.
     """
     settings, fits = DoubtSettings.current(), []
     parts = np.array_split(np.arange(len(inverse.measured)), 2)
     sizes = np.array([np.linalg.norm(inverse.columns[part, :2], axis=0) / np.sqrt(len(part)) for part in parts])
-    if (sizes.max(axis=0) > settings.ratio_of_comparable_halves * sizes.min(axis=0)).any():
-        return []
+    unlike = (sizes.max(axis=0) > settings.ratio_of_comparable_halves * sizes.min(axis=0))[[0, 1, 1]]
     for part in parts:
         columns, force = inverse.columns[part], inverse.measured[part]
         solution, left = least_squares(columns, force)
@@ -65,7 +64,7 @@ def halves(inverse: InverseModel) -> list[Half]:
     return [
         Half(name, *(float(number) for number in (*values[:, i], low[i], high[i])))
         for i, name in enumerate(WORDS)
-        if apart[i] and np.isfinite(off[:, i]).all()
+        if apart[i] and not unlike[i] and np.isfinite(off[:, i]).all()
     ]
 
 

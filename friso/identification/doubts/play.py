@@ -18,9 +18,9 @@ from friso.quantities import percent
 def find(case: FitCase) -> Iterator[RaisedDoubt]:
     """Name the width of the play if a load with play explains most of the residual.
 
-    If the widest play that is tried explains most, something slower is the cause; if the narrowest does, something
-    quicker, such as bristles. If the play is as narrow as the steps of the position, they may be it. No play is named
-    then, but the intervals are widened.
+    If the widest play that may be tried explains most, something slower is the cause; if the narrowest does, something
+    quicker, such as bristles. If the play is hardly wider than the steps of the position, they may be it. No play is
+    named then, but the intervals are widened.
     """
     settings, effect = DoubtSettings.current(), case.led_by("play")
     if effect is None:

@@ -71,12 +71,11 @@ class OutputErrorFit:
         return bounded
 
     def is_noise_of_motion(self, noise: float) -> bool:
-        """Tell whether noise of the logged motion explains the whole residual.
+        """Tell whether noise of an integrated motion, which accumulates to slow effects, explains the whole residual.
 
-        Such noise accumulates and resembles slow effects. `noise` [N] is that of the logged force. The result is False
-        if noise of the motion is small beside it.
+        `noise` [N] is that of the logged force.
         """
-        return self.problem.shaking[0] > 0 and self.left <= self.problem.noise_left(noise)
+        return self.problem.accumulates and self.left <= self.problem.noise_left(noise)
 
     @property
     def independent(self) -> float:
@@ -205,7 +204,8 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     )
     shares = qmc.Sobol(len(first), rng=settings.seed_of_starts).random(settings.starts_of_a_fit)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
-    starts[::2] = np.where(core, first, starts[::2])
+    half = len(starts) // 2  # of a Sobol sequence, either half is spread evenly, but not every second point
+    starts[:half] = np.where(core, first, starts[:half])
     return np.vstack([first, starts])
 
 

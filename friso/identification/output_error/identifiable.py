@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 
 import numpy as np
 from scipy.stats import chi2
@@ -86,7 +87,7 @@ def fit_identifiable(
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
     part = between(progress, ALONG, AGAIN_LOOP, "moves: the closed loop from there")
-    best = min((fit(loop, along.fit.free, starts, part), *explaining), key=_cost)
+    best = min((fit(loop, along.fit.free, starts, part), *explaining), key=attrgetter("cost"))
     if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
         return along
     if best.explains(noise, closely=True):
@@ -113,11 +114,8 @@ def _identifiable_on_log(
     full = fit(follows, numbers, everywhere(follows, numbers, plain.inner), part)
     between(progress, FITTED, SETTLED)(0, 0, "moves: what happens between the samples")
     full = with_force_settled(with_smoothness_settled(full), noise)
-    again, part = not full.explains(noise), between(progress, FITTED, SETTLED, "moves: all parameters once more")
-    while again:  # with mass and friction known better, another optimum may show
-        other = fit(full.problem, numbers, everywhere(full.problem, numbers, full.inner), part)
-        again = other.cost < OutputErrorSettings.current().cost_share_of_another_optimum * full.cost
-        full = min(full, other, key=_cost)
+    if not full.explains(noise):
+        full = with_force_settled(with_smoothness_settled(_searched_again(full)), noise)
     answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
@@ -162,9 +160,18 @@ def believed(
     return IdentifiableFit(full, profiles, frozenset(_complete(shown, {*names} - core)))
 
 
-def _cost(fit: OutputErrorFit) -> float:
-    """Return the mean square of a fit's residual [N^2]."""
-    return fit.cost
+def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
+    """Search all parameters again from the mass and friction of a fit, as long as that finds another optimum.
+
+    A fit within the noise is no reason to stop: of small moves it was the second of three optima, and not yet right.
+    """
+    settings = OutputErrorSettings.current()
+    for _ in range(settings.further_searches):
+        before, problem = full, full.problem
+        full = min(full, fit(problem, full.free, everywhere(problem, full.free, full.inner)), key=attrgetter("cost"))
+        if full.cost > settings.cost_share_of_another_optimum * before.cost:
+            break
+    return full
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:

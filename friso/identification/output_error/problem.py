@@ -55,8 +55,8 @@ class Problem:
     `start` has position [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at samples that the fit
     leaves out. `unsettled` has alternative inputs that the log allows (held or interpolated force, smoothness).
     `sharper` has positions [m], smoothed less and less, that the stage may follow instead. `shaking` [N] is the guiding
-    controller's force due to position noise, for the position followed and each sharper one; 0 if small beside the
-    force's noise.
+    controller's force due to noise of the motion, for the position followed and each sharper one. The noise
+    `accumulates` if the position was integrated from a velocity.
     """
 
     flat: Mapping[str, Any]
@@ -70,6 +70,7 @@ class Problem:
     unsettled: tuple[Inputs, ...] = ()
     sharper: tuple[np.ndarray, ...] = ()
     shaking: tuple[float, ...] = (0.0,)
+    accumulates: bool = False
     cutoffs: tuple[float, ...] = (np.inf,)
 
     @property
@@ -83,18 +84,20 @@ class Problem:
         return kernel(self.form)
 
     def noise_left(self, noise: float) -> float:
-        """Return the RMS residual [N] that noise alone leaves, if the force has this `noise` [N].
+        """Return the RMS residual [N] that errors of the sensors leave, if the force has this `noise` [N].
 
         In closed loop the residual is the noise itself. For a stage that follows the log, the guiding controller passes
         only slow noise. The controller's response to position noise is added, and so is the error of a force sensor
-        that is not quite linear.
+        that is not quite linear, as far as it is small beside Coulomb friction.
         """
         if self.closed:
             return noise
-        passed = noise * _passes(2 * self.flat[KP] / self.flat[KD], self.inputs.sample_time)
-        force = np.sqrt(np.mean(self.inputs.force[self.counted > 0] ** 2))
-        linear = ReadingSettings.current().linearity_of_sensors * force
-        return float(np.linalg.norm([passed, self.shaking[0], linear]))
+        omega = 2 * self.flat[KP] / self.flat[KD]
+        passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
+        linear = ReadingSettings.current().linearity_of_sensors * np.std(self.inputs.force[self.counted > 0])
+        most = OutputErrorSettings.current().friction_share_of_linearity
+        linear = min([linear, *(most * one.start for one in self.parameters if one.name == "friction.coulomb")])
+        return float(np.linalg.norm([noise * passes, self.shaking[0], linear]))
 
     def held_to(self, level: int) -> Problem:
         """Return the problem with the stage driven along one of the `sharper` positions, by number.
@@ -303,7 +306,7 @@ def tracking(
     counted[-round(1 / (cutoffs[0] * step)) - 1 :] = 0.0  # the smoothed signal lacks samples beyond the end
     if not counted.any():
         actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {settling:.2g} s on end"
-        expected = "moves that last longer: is a unit another one, or does the body swing without sliding?"
+        expected = "longer moves: is the time or the position in another unit, or does the body never slide?"
         raise InputError("position", actual, expected, '--unit TIME="ms", or --as presliding', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
@@ -319,29 +322,21 @@ def tracking(
         counted * log.measured(part),
         (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
         tuple(sharper),
-        tuple(_shaking(log, part, 2 * mass * omega, omega, cutoff) for cutoff in cutoffs),
+        tuple(2 * mass * omega * _shaking(log, part, cutoff) for cutoff in cutoffs),
+        log.is_integrated,
         tuple(cutoffs),
     )
 
 
-def _passes(omega: float, sample_time: float) -> float:
-    """Return the fraction of a force's noise that a guiding controller of frequency `omega` [rad/s] passes."""
-    return min(1.0, float(np.sqrt(2 * PASSES * omega * sample_time)))
+def _shaking(log: Log, part: slice, cutoff: float) -> float:
+    """Return the velocity noise [m/s] below `cutoff` [Hz] of a log's motion.
 
-
-def _shaking(log: Log, part: slice, damping: float, omega: float, cutoff: float) -> float:
-    """Return the noise [N] of a guiding controller's force due to noise of the motion below `cutoff` [Hz].
-
-    The controller has a `damping` [N s/m] and the frequency `omega` [rad/s]. Noise of a velocity that was integrated
-    always counts, since it accumulates in the position. Noise of a position counts if it exceeds that of the force;
-    otherwise the result is 0.
+    It is the noise of a velocity that was integrated, which accumulates in the position, or that of the position.
     """
     band = min(cutoff, 0.5 / log.sample_time)
     if log.is_integrated:
-        return damping * float(noise_of(log["velocity"][part]) * np.sqrt(2 * band * log.sample_time))
-    velocity = noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3)
-    force = noise_of(log["force"][part]) * _passes(omega, log.sample_time)
-    return damping * float(velocity) if damping * velocity > force else 0.0
+        return float(noise_of(log["velocity"][part]) * np.sqrt(2 * band * log.sample_time))
+    return float(noise_of(log["position"][part]) * 2 * np.pi * np.sqrt(2 * log.sample_time * band**3 / 3))
 
 
 def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:

@@ -52,6 +52,9 @@ class OutputErrorSettings(Settings):
     """Ratio of a new fit's sum of squares to the last one's below which it counts as another optimum, and a further
     search may pay."""
 
+    further_searches: int = setting(4, "")
+    """Largest number of further searches, each of which follows another optimum."""
+
     starts_near_a_fit: int = setting(127, "")
     """Number of starts around an earlier fit, needed because the closed loop of a hunting stage has other optima."""
 
@@ -88,6 +91,10 @@ class OutputErrorSettings(Settings):
 
     highest_stribeck_velocity: float = setting(0.02, "m/s")
     """Highest plausible Stribeck velocity of a bearing."""
+
+    friction_share_of_linearity: float = setting(0.01, "")
+    """Largest error of a force sensor's linearity that counts, relative to Coulomb friction. More would hide effects
+    of a tenth of the friction."""
 
     # Simulation of a stage along a log, and the samples that count.
     derivative_step: float = setting(1e-4, "")

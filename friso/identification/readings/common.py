@@ -176,8 +176,8 @@ def digit_of(signal: np.ndarray) -> float:
     """Return the resolution of a signal, shape (n,); 0 if it has none.
 
     The resolution is the common step of the levels at which the signal stays (interpolation does not change it), else
-    the smallest step. A stepped command has no resolution: it mostly stays at a few levels, or at levels that it
-    reaches by single jumps of several common steps.
+    the smallest step. A stepped command has no resolution: it mostly stays at a few levels, or it changes seldom, by
+    several common steps.
     """
     settings = ReadingSettings.current()
     steps = np.abs(np.diff(signal))
@@ -189,8 +189,8 @@ def digit_of(signal: np.ndarray) -> float:
     if apart.size >= settings.levels_of_a_digit:
         digits = apart / apart.min()
         if np.abs(digits - np.round(digits)).max() <= settings.error_of_a_digit:
-            single = np.count_nonzero(changes[1:] & changes[:-1]) < settings.share_of_long_changes * real.size
-            stepped = single and np.median(real) > settings.digits_of_a_commanded_step * apart.min()
+            few = real.size < settings.share_of_commanded_changes * steps.size
+            stepped = few and np.median(real) > settings.digits_of_a_commanded_step * apart.min()
             return 0.0 if stepped else float(apart.min())
     elif stays.size > steps.size / 2:
         return 0.0

@@ -252,10 +252,8 @@ def _direction(
         return _still_falling(coulomb, viscous, f"from {low:.3g} to {high:.3g} mm/s friction falls with the speed")
     flat = f"{slowest}: no rise of friction towards rest shows"
     static = Estimate.unknown("friction.static", "N", method, flat, coulomb.low)
-    speed, exponent_open = (
-        replace(one, method=method) for one in (_nothing(flat).stribeck_velocity, _nothing(flat).stribeck_exponent)
-    )
-    return Direction(coulomb, viscous, static, speed, exponent_open, covariance)
+    nothing = _nothing(flat)
+    return replace(nothing, coulomb=coulomb, viscous=viscous, static=static, covariance=covariance)
 
 
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:

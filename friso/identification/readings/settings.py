@@ -58,12 +58,13 @@ class ReadingSettings(Settings):
     error_of_a_digit: float = setting(0.1, "")
     """Largest distance of levels from multiples of the resolution, relative to it."""
 
-    share_of_long_changes: float = setting(0.1, "")
-    """Largest fraction of the changes of a stepped command that last for more than one sample."""
+    share_of_commanded_changes: float = setting(0.03, "")
+    """Largest fraction of samples at which a stepped command changes. A rounded signal that is logged ten times as
+    often as it changes has more."""
 
     digits_of_a_commanded_step: float = setting(1.5, "")
-    """Smallest usual jump of a stepped command, in common steps of its levels. A rounded signal that changes in single
-    jumps is slow, and changes by one step."""
+    """Smallest usual jump of a stepped command, in common steps of its levels. A rounded signal that changes seldom is
+    slow, and changes by one step."""
 
     power_of_clear_motion: float = setting(100.0, "")
     """Smallest power of visible motion, relative to the noise. Less occurs by chance among many spectral lines."""

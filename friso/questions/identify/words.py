@@ -98,7 +98,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     lines += [(GREEN, sentence) for sentence in headlines]
     lines += [] if first else doubts
     nothing = [estimate for estimate in visible if estimate not in effects]
-    for colour, words, absent in ((GREEN, "None found", True), (ORANGE, "Perhaps none", False)):
+    for colour, words, absent in ((GREEN, "None found", True), (ORANGE, "Not told from zero", False)):
         some = [f"{within(one.name)} ({interval_text(one)})" for one in nothing if (one.name in ABSENT) == absent]
         lines += [(colour, f"{words}: {', '.join(some)}.")] if some else []
     if identification.stage is None and (estimates or not headlines):
