@@ -44,7 +44,7 @@ def allowed_for(case: KeyCase) -> KeyCase:
         case = replace(case, estimates=estimates, correlation=correlation)
     elif not is_free(case.flat):
         case = case.with_answers(RaisedDoubt(answers=_with_model_error(case)))
-    imitated = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
+    imitated: dict[str, str] = dict.fromkeys(BRISTLES, IMITATED) if quality.may_imitate_bristles else {}
     imitated |= dict.fromkeys(SLOW_FRICTION, IMITATED) if quality.lacks_something else {}
     case = case.with_answers(RaisedDoubt(refuses={**imitated, **case.refused}))
     if is_free(case.flat):

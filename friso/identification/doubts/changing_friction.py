@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class RecordDrift:
     constant: float
     friction_reach: float
     constant_reach: float
-    sure: bool = True
+    sure: bool = field(default=True, kw_only=True)
 
 
 def find(case: FitCase) -> Iterator[RaisedDoubt]:

@@ -94,10 +94,10 @@ class Problem:
             return noise
         omega = 2 * self.flat[KP] / self.flat[KD]
         passes = min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time))
-        linear = ReadingSettings.current().linearity_of_sensors * np.std(self.inputs.force[self.counted > 0])
+        linear = ReadingSettings.current().linearity_of_sensors * float(np.std(self.inputs.force[self.counted > 0]))
         most = OutputErrorSettings.current().friction_share_of_linearity
         linear = min([linear, *(most * one.start for one in self.parameters if one.name == "friction.coulomb")])
-        return float(np.linalg.norm([noise * passes, self.shaking[0], linear]))
+        return float(np.linalg.norm(np.array([noise * passes, self.shaking[0], linear])))
 
     def held_to(self, level: int) -> Problem:
         """Return the problem with the stage driven along one of the `sharper` positions, by number.
