@@ -25,18 +25,18 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
     The damping of friso's bristles is constant; another form falls as exp(-(v/v_s)^2) (Olsson et al. 1998,
     doi:10.1016/S0947-3580(98)70113-X). On logs of the other form, bristles came out up to 1.8 times too stiff. The
-    other form is fitted with several dampings at rest, by the force that each saves along the log: on drawn
-    logs it left 3 % of the residual's power more, at least, where damping was constant, and 6 % less, at least, on 7 of
-    8 logs of its own. Only a stage that follows the log is examined.
+    other form is fitted with several dampings at rest, by the force that each saves along the log. On drawn logs with
+    constant damping it left at least 3 % more of the residual's power; on 7 of 8 logs of its own, at least 6 % less.
+    Only a stage that follows the log is examined.
     """
     fit, settings = case.fit, OutputErrorSettings.current()
     if not case.determined.keys() & {*BRISTLES} or fit.problem.closed or not {*fit.problem.names} >= NEEDED:
         return
-    free = np.isin(np.arange(len(fit.inner)), fit.free)
+    free, saved = np.isin(np.arange(len(fit.inner)), fit.free), _saved(fit)
     for share in DoubtSettings.current().falling_dampings:
         damping, start = share * np.sqrt(fit.value(STIFFNESS) * fit.value(MASS)), fit.inner.copy()
         start[fit.problem.names.index(DAMPING)] = np.log(damping)
-        inputs = replace(fit.problem.inputs, force=fit.problem.inputs.force + damping * _saved(fit))
+        inputs = replace(fit.problem.inputs, force=fit.problem.inputs.force + damping * saved)
         other = refine_fit(
             [replace(fit.problem, inputs=inputs)],
             start[None],
@@ -50,16 +50,13 @@ def find(case: KeyCase) -> Iterator[RaisedDoubt]:
 
 
 def _saved(fit: OutputErrorFit) -> np.ndarray:
-    """Return the velocity [m/s], shape (n,), of bristles along the log, times the fraction by which damping has fallen.
+    """Return the force that falling damping saves along the log, per damping at rest [m/s], shape (n,).
 
-    Times a damping at rest, it is the force that damping which falls with the speed saves.
+    It is the rate at which the bristles bend, times the fraction by which the damping has fallen.
     """
     position, step = fit.problem.inputs.reference, fit.problem.inputs.sample_time
-    velocity, stribeck, coulomb = (
-        np.gradient(position, step),
-        fit.value("friction.stribeck_velocity"),
-        fit.value("friction.coulomb"),
-    )
+    stribeck, coulomb = fit.value("friction.stribeck_velocity"), fit.value("friction.coulomb")
+    velocity = np.gradient(position, step)
     level = stribeck_curve(np.abs(velocity), coulomb, fit.value(RATIO) * coulomb, stribeck, fit.value(EXPONENT))
     rate = np.gradient(deflections(np.diff(position), level[1:] / fit.value(STIFFNESS)), step)
     return rate * (1 - np.exp(-((velocity / stribeck) ** 2)))

@@ -18,7 +18,7 @@ def find(case: FitCase) -> Iterator[RaisedDoubt]:
     A force that acts later by a short time differs from the logged force by that time times its derivative. Bristles
     turn the delay into damping, by their stiffness, and inertia turns it into viscous friction. Only a stage that
     follows the log is examined. In slow motion a delay cannot be told from friction at the reversals, and is not named;
-    nor is it if it leaves much of the residual, as a coarse encoder's does.
+    nor is one that leaves much of the residual, as digits of an encoder do.
     """
     settings = DoubtSettings.current()
     for tried, explained in case.explained(forces):
