@@ -123,24 +123,10 @@ class Tracer:
         or from approximate `states` (1, states) of the cycle sought. It uses the Jacobian of the nearby cycle first,
         then a new one. Returns None if no cycle is found.
         """
-        point = self._solved(near, target, normal, states)
+        point = self._solved(near, target[None], normal, states)[0]
         if point is None and near.jacobians is not None:
-            return self._solved(replace(near, jacobians=None), target, normal, states)
+            return self._solved(replace(near, jacobians=None), target[None], normal, states)[0]
         return point
-
-    def _solved(
-        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
-    ) -> Point | None:
-        """Make one attempt to find a cycle on a plane in the space of place, log distance, log time.
-
-        The plane passes through `target` with the normal `normal`. The Jacobian of the cycle `near` is used, if it has
-        one. Returns None if no cycle is found.
-        """
-        begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
-        if states is not None or near.jacobians is None:
-            begin = begin * np.exp(target[1] - near.distance) if states is None else states
-            times, place = times * np.exp(target[2] - near.time), target[:1]
-        return self._closed(begin, times, place, target[None], normal, near.jacobians)[0]
 
     def solve_all(self, near: Point, targets: np.ndarray, normal: np.ndarray) -> list[Point]:
         """Find cycles on parallel planes at once, from a cycle `near` them all.
@@ -148,10 +134,24 @@ class Tracer:
         The planes pass through `targets`, (planes, 3), with the `normal`, (3,), in the space of place, log distance and
         log time. Cycles that are not found are left out.
         """
-        begin = near.cycle.states * np.exp(targets[:, 1:2] - near.distance)
-        times = near.cycle.orbits.times * np.exp(targets[:, 2] - near.time)
-        points = self._closed(begin, times, targets[:, 0], targets, normal)
-        return [point for point in points if point]
+        return [point for point in self._solved(near, targets, normal) if point]
+
+    def _solved(
+        self, near: Point, targets: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
+    ) -> list[Point | None]:
+        """Make one attempt to find a cycle on each of several parallel planes; None where none is found.
+
+        The planes pass through `targets`, (planes, 3), with the `normal`, (3,). The search starts from the cycle `near`
+        the planes, with its Jacobian if it has one, or from approximate `states` (planes, states).
+        """
+        count, jacobians = len(targets), near.jacobians
+        begin, times, places = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
+        begin, times, places = (np.repeat(values, count, axis=0) for values in (begin, times, places))
+        if states is not None or jacobians is None:
+            begin = begin * np.exp(targets[:, 1:2] - near.distance) if states is None else states
+            times, places = times * np.exp(targets[:, 2] - near.time), targets[:, 0]
+        jacobians = jacobians if jacobians is None else np.repeat(jacobians, count, axis=0)
+        return self._closed(begin, times, places, targets, normal, jacobians)
 
     def _closed(
         self,

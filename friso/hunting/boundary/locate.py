@@ -108,38 +108,41 @@ def _enclosed(
 ) -> dict[float, Point] | None:
     """Search for a special point between two neighbours on a branch, to a length `precise`.
 
+    The next cycle is closed where the cycles so far predict the special point, slightly farther in the wider part of
+    the interval that encloses it. It is closed in the middle where that narrows the interval more slowly than halving.
     Returns all computed cycles by their length along the branch, counted from the first neighbour; None if a cycle
     cannot be closed.
     """
-    settings = ContinuationSettings.current()
-    from scipy.optimize import brentq  # 0.4 s to import
-
     direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
-
-    def distance(place_along: float) -> float:
-        """Return how far the multiplier is from its special value, at a length along the branch.
-
-        The difference has a sign. Raises Unreached if no cycle can be closed there.
-        """
-        if place_along not in points:
-            nearest = min(points, key=lambda place: abs(place - place_along))
-            point = tracer.solve(points[nearest], first.vector + place_along * direction, direction)
-            if point is None:
-                raise Unreached
-            points[place_along] = point
-        return distance_to(kind, points[place_along])
-
-    try:
-        root = float(brentq(distance, 0.0, length, xtol=precise, maxiter=settings.special_point_tries))  # type: ignore[arg-type]
-        distance(root)
-    except (Unreached, RuntimeError):
-        return None
-    return points
+    for tries in range(ContinuationSettings.current().special_point_tries):
+        places = np.array(sorted(points))
+        distances = np.array([distance_to(kind, points[place]) for place in places.tolist()])
+        passed = int(np.flatnonzero(distances[:-1] * distances[1:] <= 0)[0])
+        low, high = places[passed : passed + 2].tolist()
+        if high - low <= precise or not distances[passed : passed + 2].all():
+            return points
+        middle, predicted = (low + high) / 2, _predicted(places, distances)
+        place = predicted + np.copysign(precise / 2, middle - predicted)
+        if not low < place < high or high - low > length * 0.5 ** (tries / 1.5):
+            place = middle
+        near = min((low, high), key=lambda end: abs(end - place))
+        point = tracer.solve(points[near], first.vector + place * direction, direction)
+        if point is None:
+            return None
+        points[place] = point
+    return None
 
 
-class Unreached(Exception):
-    """Error: no cycle could be closed at some length along a branch."""
+def _predicted(places: np.ndarray, distances: np.ndarray) -> float:
+    """Return where a distance passes zero, by a cubic through the four values nearest to zero.
+
+    `distances`, shape (n,), are the values at `places`, which the cubic gives as a function of them.
+    """
+    nearest = np.argsort(np.abs(distances))[:4]
+    at, values = places[nearest], distances[nearest]
+    others = [np.delete(values, k) for k in range(len(values))]
+    return float(sum(place * np.prod(rest / (rest - own)) for place, own, rest in zip(at, values, others, strict=True)))
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
