@@ -285,7 +285,7 @@ def test_ctrl_c_keeps_the_stages_judged_so_far(rig: Stage, monkeypatch: pytest.M
     stage, sample = rig, Sample({"masses.stage": np.linspace(0.4, 0.6, 10)}, 10, 0, {})
     judged = []
 
-    def judge(flat: object, count: int, rtol: float) -> np.ndarray:
+    def judge(flat: object, count: int, rtol: float, attracted: object) -> np.ndarray:
         judged.append(count)
         if len(judged) == most:
             raise KeyboardInterrupt

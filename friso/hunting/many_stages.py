@@ -148,14 +148,16 @@ def loops_unstable(flat: Mapping[str, Any], count: int) -> np.ndarray:
 
 
 @np.errstate(all="ignore")
-def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
+def judge_many(
+    flat: Mapping[str, Any], count: int, rtol: float, attracted: StageAttractors | None = None
+) -> np.ndarray:
     """Judge stages of one structure, whose own motions are run to the relative tolerance `rtol`.
 
     Returns words of `friso.hunting.criteria.VERDICTS`, shape (count,). A stage has "failed" if its own motion was not
     completed. It is "undecided" if its attractors, or the end of its motion, are not certain. `flat` has the stages'
-    keys in SI.
+    keys in SI, and `attracted` their attractors if they are known.
     """
-    attracted = find_attractors(flat, count)
+    attracted = attracted or find_attractors(flat, count)
     return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), attracted, rtol)
 
 

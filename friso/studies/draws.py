@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -25,8 +25,8 @@ class Fates:
     """Verdicts on drawn stages, and which of their linear loops are unstable, both (count,).
 
     Verdicts are words of `friso.hunting.criteria.VERDICTS`. A loop counts as `unstable` if it is so while the stage
-    sticks, or while it slides. `amplitudes` [m], half of peak to peak, and `periods` [s] belong to the first stages
-    drawn, shape (count,) or shorter. They are NaN for a stage that has no attractor, or an uncertain one.
+    sticks, or while it slides. `amplitudes` [m], half of peak to peak, and `periods` [s] have the shape (count,) too,
+    or are empty if they are not known. They are NaN for a stage that has no attractor, or an uncertain one.
     """
 
     verdicts: np.ndarray
@@ -67,8 +67,8 @@ class Fates:
 def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
     """Judge the drawn stages in each variant: as in the file and, with a joint, locked and free.
 
-    The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then,
-    without amplitudes and periods of hunting. Raises KeyboardInterrupt if there are none yet.
+    The verdicts come by name of the variant. After Ctrl-C, the result has the stages judged in all variants by then.
+    Raises KeyboardInterrupt if there are none yet.
     """
     settings = StudySettings.current()
     variants = different(stage)
@@ -82,11 +82,10 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
             judged = {name: _fates(variant, sample, chunk, rtol, tally) for name, variant in variants.items()}
             for name, part in judged.items():
                 parts[name].append(part)
-        by_variant = {name: _with_swings(variants[name], sample, _joined(some)) for name, some in parts.items()}
     except KeyboardInterrupt:
         if not all(parts.values()):
             raise
-        by_variant = {name: _joined(some) for name, some in parts.items()}
+    by_variant = {name: _joined(some) for name, some in parts.items()}
     return {
         name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
@@ -206,24 +205,14 @@ def _fates(stage: Stage, sample: Sample, chunk: slice, rtol: float, tally: Tally
     """Judge those of the drawn stages that are in a slice, the `chunk`."""
     flat = laid_over(stage, {key: values[chunk] for key, values in sample.keys.items()})
     count = chunk.stop - chunk.start
-    judged = Fates(judge_many(flat, count, rtol), loops_unstable(flat, count))
+    attracted = find_attractors(flat, count)
+    verdicts = judge_many(flat, count, rtol, attracted)
+    sure = attracted.certain & np.isin(verdicts, ATTRACTED)
+    swings = (np.where(sure, values, np.nan) for values in (attracted.amplitude, attracted.period))
     tally.add(count, "machines drawn")
-    return judged
+    return Fates(verdicts, loops_unstable(flat, count), *swings)
 
 
 def _joined(parts: Sequence[Fates]) -> Fates:
     """Join the verdicts on several groups of stages into one `Fates`."""
-    return Fates(np.concatenate([part.verdicts for part in parts]), np.concatenate([part.unstable for part in parts]))
-
-
-def _with_swings(stage: Stage, sample: Sample, judged: Fates) -> Fates:
-    """Add amplitudes and periods of hunting of the first drawn stages, NaN where not certain."""
-    first_ones = min(sample.count, StudySettings.current().draws_of_a_swing)
-    amplitudes, periods = np.full((2, first_ones), np.nan)
-    swinging = np.flatnonzero(np.isin(judged.verdicts[:first_ones], ATTRACTED))
-    if swinging.size:
-        flat = laid_over(stage, {key: values[swinging] for key, values in sample.keys.items()})
-        attracted = find_attractors(flat, swinging.size)
-        amplitudes[swinging] = np.where(attracted.certain, attracted.amplitude, np.nan)
-        periods[swinging] = np.where(attracted.certain, attracted.period, np.nan)
-    return replace(judged, amplitudes=amplitudes, periods=periods)
+    return Fates(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Fates)))

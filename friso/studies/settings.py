@@ -46,9 +46,6 @@ class StudySettings(Settings):
     """Work of a check without a requested number of draws (see `friso.engine.allowance`). It takes about 4 s on one
     core."""
 
-    draws_of_a_swing: int = setting(64, "")
-    """Draws whose amplitude and period are reported. A range of fewer leaves a tenth of the machines out."""
-
     draws_of_an_edge: int = setting(16, "")
     """Draws whose edge of hunting is searched. Each takes as many searches as steps and halvings together."""
 

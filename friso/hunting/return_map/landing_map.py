@@ -152,12 +152,17 @@ class LandingMap:
 
         Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
         """
-        settings = SurveySettings.current()
         begins, values, slopes = self._lines
-        pieces = np.searchsorted(begins, places, side="right") - 1
+        pieces = begins.searchsorted(places, side="right") - 1
         after = values[pieces] + slopes[pieces] * places
-        nearest = np.where(after > OTHER_SIDE / 2, after - OTHER_SIDE, after) < np.log(settings.least_swing)
-        return np.where(nearest, REST, after)
+        near = self._nearest
+        after[(after < near) | ((after > OTHER_SIDE / 2) & (after < OTHER_SIDE + near))] = REST
+        return after
+
+    @cached_property
+    def _nearest(self) -> float:
+        """Return the coordinate of the nearest landing that is told from rest."""
+        return float(np.log(SurveySettings.current().least_swing))
 
     @cached_property
     def attractors(self) -> tuple[MapAttractor, ...]:
