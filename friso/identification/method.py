@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import repeat
 from typing import Any
 
 import numpy as np
 
 from friso.axis import LINEAR, AxisKind
+from friso.engine.side_by_side import side_by_side
 from friso.errors import InputError
 from friso.identification.combine import combined, correlations
 from friso.identification.doubt import words_of
@@ -19,7 +22,7 @@ from friso.identification.laws.comparison import LawComparison, compare_laws
 from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified_stage, origins
 from friso.identification.stage_keys import Fitting, fitting
-from friso.progress import Progress, share_of, silent
+from friso.progress import Progress, silent, together
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
@@ -81,17 +84,17 @@ def identify(
     if base is not None and base.conditions is not None:
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
         raise InputError("conditions", "a stage with [conditions]", expected, "the stage file without [conditions]")
-    groups = _groups(logs)
+    kinds = _groups(logs)
     stage = base or around(logs)
     experiments: list[Experiment] = []
-    for number, (kind, group) in enumerate(groups):
-        part = share_of(progress, number, len(groups))
-        part(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
+    pieces = iter(together(progress, sum(map(len, kinds.values()))))
+    for kind, groups in kinds.items():
         best = combined(_every_estimate(experiments))[0]
         shown = {estimate.name: estimate for estimate in best if estimate.determined}
-        prior = Prior(stage, base is not None, shown, made_up)
-        result = KINDS[kind].analyse(group, prior, replace(settings, progress=part))
-        experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
+        analysed = partial(_analysed, kind, Prior(stage, base is not None, shown, made_up), settings)
+        results = side_by_side([partial(analysed, group, next(pieces)) for group in groups])
+        estimates = (KINDS[kind].estimates(result, stage) for result in results)
+        experiments += map(Experiment, repeat(kind), groups, results, estimates)
     estimates, warnings = combined(_every_estimate(experiments))
     doubts = _doubts(experiments)
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
@@ -230,13 +233,19 @@ def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
     ]
 
 
-def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
-    """Return the logs of each experiment with its kind, in the order of analysis."""
-    return [
-        (name, group)
-        for name in in_order()
-        for group in KINDS[name].groups([log for log, kind in logs if kind == name])
-    ]
+def _groups(logs: Sequence[tuple[Source, str]]) -> dict[str, list[tuple[Source, ...]]]:
+    """Return the logs of each experiment by kind, the kinds in the order of analysis."""
+    by_kind = {name: KINDS[name].groups([log for log, kind in logs if kind == name]) for name in in_order()}
+    return {name: groups for name, groups in by_kind.items() if groups}
+
+
+def _analysed(kind: str, prior: Prior, settings: AnalysisSettings, group: Sequence[Source], progress: Progress) -> Any:
+    """Analyse the logs of one experiment, and return the result of its kind.
+
+    `prior` has the stage and the estimates from experiments of the kinds before.
+    """
+    progress(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
+    return KINDS[kind].analyse(group, prior, replace(settings, progress=progress))
 
 
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
