@@ -119,7 +119,9 @@ def _identifiable_on_log(
     answer = believed(full, core, covered, between(progress, SETTLED, PROFILED))
     if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
-    better = _pays(full, plain) and answer.fit.bounded >= plain.bounded and not plain.is_noise_of_motion(noise)
+    alone = full.explains(noise) and not plain.explains(noise)
+    better = _pays(full, plain) and (alone or answer.fit.bounded >= plain.bounded)
+    better = better and not plain.is_noise_of_motion(noise)
     if better or answer.shown == hopeful:
         return answer
     if not answer.shown:
@@ -163,12 +165,15 @@ def believed(
 def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
     """Search all parameters again from the mass and friction of a fit, as long as that finds another optimum.
 
-    A fit within the noise is no reason to stop: of small moves it was the second of three optima, and not yet right.
+    Parameters that the motion cannot show are searched too: of small moves that never slide steadily, no model without
+    static friction explains the force. A fit within the noise is no reason to stop: of small moves it was the second of
+    three optima, and not yet right.
     """
     settings = OutputErrorSettings.current()
+    problem, free = full.problem, tuple(range(len(full.inner)))
     for _ in range(settings.further_searches):
-        before, problem = full, full.problem
-        full = min(full, fit(problem, full.free, everywhere(problem, full.free, full.inner)), key=attrgetter("cost"))
+        before = full
+        full = min(full, fit(problem, free, everywhere(problem, free, full.inner)), key=attrgetter("cost"))
         if full.cost > settings.cost_share_of_another_optimum * before.cost:
             break
     return full
