@@ -109,6 +109,7 @@ class FakeCase:
     feeding: Any = None
     static_friction: Any = None
     advice_keeps_friction: bool | None = None
+    slower_keeps_friction: bool | None = None
     dwells: tuple[Any, ...] = ()
     tracking: Any = None
 

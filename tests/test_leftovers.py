@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,23 @@ def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
     finally:
         os.umask(before)
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_folder_removed_while_filelock_makes_it_again_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Filelock then raises FileExistsError, because what exists is no folder when it looks."""
+    real, folders = FileLock.acquire, []
+
+    def acquire(lock: FileLock, *arguments: Any, **named: Any) -> Any:
+        folders.append(Path(lock.lock_file).parent)
+        if len(folders) == 1:
+            raise FileExistsError(errno.EEXIST, "File exists", str(folders[0]))
+        return real(lock, *arguments, **named)
+
+    monkeypatch.setattr(FileLock, "acquire", acquire)
+    with locked_folder(tmp_path, "a-", LOCK) as folder:
+        assert [folder] == [*tmp_path.iterdir()] == folders[1:]
 
 
 @posix

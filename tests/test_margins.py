@@ -125,7 +125,7 @@ def test_a_margin_is_told_with_both_of_its_ends() -> None:
     assert "3.93 to 4.20 N" in sentence  # 3 N times the factors that are told
     assert "2.93 to 3.20 N" in sentence  # less 1 N
     already = ParameterMargin(False, None, MarginEnd(1.0, 1.08, True), (1 / 3, 3.0))
-    assert "at 1.08 times yours or less" in margin_sentence("static friction", already)
+    assert "between 1 and 1.08 times" in margin_sentence("static friction", already)
 
 
 def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:

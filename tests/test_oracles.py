@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import friso
-from benchmarks.oracles import cycles, dcmotor, orbits, servo, switch
+from benchmarks.oracles import cycles, dcmotor, drift, orbits, servo, switch
 from benchmarks.oracles.edges import RESTS, SEED, SWINGS, edge_of, kept, what_becomes
 from benchmarks.oracles.independent import beyond, differences, same_edge
 from benchmarks.oracles.oracle import Finding, Oracle, number
@@ -22,6 +22,12 @@ from friso.hunting import Ensemble, find_cycles, find_swings
 
 PUBLISHED = 7.54040, 6.36272, 0.369816
 """First passage [s], period [s] and top speed [m/s] of the stick-slip of 1995 (references.md, section 1)."""
+
+
+def test_bristles_creep_under_a_load_that_oscillates_below_break_away() -> None:
+    """LuGre's do, without end; elasto-plastic ones do not (references.md, section 9)."""
+    assert drift.by_friso("lugre") == pytest.approx(drift.by_scipy("lugre"), rel=1e-6)
+    assert abs(drift.by_friso("elasto_plastic")) < 1e-12
 
 
 def test_the_servo_of_1995_hunts_with_its_integral_and_rests_without() -> None:

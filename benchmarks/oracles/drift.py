@@ -22,7 +22,8 @@ LOAD, SWAY, FREQUENCY = 0.4, 0.25, 20.0
 """A steady load [N] and an oscillating one [N, Hz]; together at most 0.65 N."""
 
 SPRING = 1e-3
-"""Stiffness [N/m] of a spring so soft that it holds nothing, because a stage needs some controller."""
+"""Stiffness [N/m] of a spring so soft that its force is the steady load: its far end steps away at first. A bias would
+be carried from the start."""
 
 FROM, TO = 20, 220
 """Periods of the load between which drift is measured."""
@@ -48,14 +49,13 @@ def stage(law: str) -> Stage:
         name=f"drift, {law}",
         masses={"cart": f"{MASS} kg"},
         friction=friction,
-        bias={"cart": f"{LOAD} N"},
         controller={
             "kind": "pid",
             "kp": f"{SPRING} N/m",
             "dither_amplitude": f"{SWAY} N",
             "dither_frequency": f"{FREQUENCY} Hz",
         },
-        motion={"kind": "hold", "duration": f"{TO / FREQUENCY} s"},
+        motion={"kind": "step", "size": f"{LOAD / SPRING} m", "duration": f"{TO / FREQUENCY} s"},
     )
 
 

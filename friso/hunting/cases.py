@@ -76,8 +76,9 @@ class Case:
     - `unstable_as_built`: states in which only sampling and delay make it unstable.
     - `feeding`: with a backlash, the cause without which hunting ends (None also if the search took too much work).
     - `static_friction`: margin in static friction (None: not asked for, or see `friso.hunting.stage_margins`).
-    - `advice_keeps_friction`: whether the advised bandwidth, a factor beyond the edge of hunting, still does not hunt
-      with that factor more or less static friction (None: no such advice, or unknown).
+    - `advice_keeps_friction`, `slower_keeps_friction`: whether the higher and the lower bandwidth advised, a factor
+      beyond the edge of hunting, still do not hunt with that factor more or less static friction (None: no such advice,
+      or unknown).
     - `dwells`: how the stage settles at each place, if its reference stands at more than two.
     - `tracking`: how it follows a reference that keeps moving (None: one that stands in the end).
     - `trace`: the time response, if asked for.
@@ -103,6 +104,7 @@ class Case:
     feeding: Feeding | None = None
     static_friction: ParameterMargin | None = None
     advice_keeps_friction: bool | None = None
+    slower_keeps_friction: bool | None = None
     dwells: tuple[Dwell, ...] = ()
     tracking: Tracking | None = None
     trace: xr.Dataset | None = None
@@ -242,7 +244,7 @@ def _case(
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, CheckSettings.current().feeding_work_share * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, CheckPart.FEEDING))
-    static_friction = keeps = None
+    static_friction, keeps = None, (None, None)
     if margins:
         begin(CheckPart.FRICTION)
         static_friction, keeps = _friction(stage, judgement, work)
@@ -272,7 +274,8 @@ def _case(
         dwells=dwells(stage, rtol) if len(stands(flat)) > 2 and status == Status.DONE else (),
         tracking=tracking(stage, rtol) if keeps_moving(flat) else None,
         static_friction=static_friction,
-        advice_keeps_friction=keeps,
+        advice_keeps_friction=keeps[0],
+        slower_keeps_friction=keeps[1],
         trace=simulate(stage, rtol) if traces else None,
     )
 
@@ -289,22 +292,29 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
         return None
 
 
-def _friction(stage: Stage, judgement: Judgement, work: float) -> tuple[ParameterMargin | None, bool | None]:
+def _friction(
+    stage: Stage, judgement: Judgement, work: float
+) -> tuple[ParameterMargin | None, tuple[bool | None, bool | None]]:
     """Find what static friction starts or ends hunting, and whether the advice allows for it.
 
-    The second result is true if a stage with the advised bandwidth does not hunt with somewhat other static friction.
-    It is None if there is no such advice. Each result is None if its allowance of work does not suffice.
+    The second result is for the higher and the lower bandwidth advised: true if a stage with it does not hunt with
+    somewhat other static friction, and None if it is not advised. Each result is None if its allowance of work does not
+    suffice.
     """
     settings = CheckSettings.current()
     with allowance(settings.friction_margin_work_share * work):
         margin = friction_margin(stage, judgement)
-    edge, distance = judgement.margin, SEARCH_LIMITS.edge_distance
-    if margin is None or edge is None or judgement.swing is None:
-        return margin, None
-    to = edge.quiet * distance
-    if to > SEARCH_LIMITS.highest_bandwidth:
-        return margin, None
-    return margin, keeps_friction_margin(stage, to, settings.advice_work_share * work)
+    if margin is None or judgement.swing is None:
+        return margin, (None, None)
+    edge, lower = judgement.margin, judgement.slower_advised
+    higher = edge and edge.quiet * SEARCH_LIMITS.edge_distance
+
+    def kept(factor: float | None) -> bool | None:
+        """Tell whether the stage does not hunt with other static friction at a `factor` of its bandwidth."""
+        within = factor is not None and factor <= SEARCH_LIMITS.highest_bandwidth
+        return keeps_friction_margin(stage, factor, settings.advice_work_share * work) if within else None  # type: ignore[arg-type]
+
+    return margin, (kept(higher), kept(lower))
 
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:

@@ -16,7 +16,7 @@ from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import Stand, ends_evenly, last_corner, stands
 from friso.equations.structure import structure
-from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes
+from friso.hunting.criteria.run_outcome import BAND, End, end_of_traces, last_outside, outcomes, swings_on
 from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import Turns, scan_turning_points
@@ -55,7 +55,7 @@ class Measures:
 
     - `peaks`: the thesis's peak count; `distinct_peaks`: count of distinct peaks (see
       `friso.hunting.criteria.peak_count`).
-    - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no period).
+    - `peak_to_peak` [m] and `period` [s] of the last quarter (NaN: no swing, or one that dies out).
     - `settling_time` [s]: until the deviation stays within each of `BANDS`, wherever the reference stands;
       `in_the_end`: at the last of these places (NaN: not within the run; see `friso.hunting.criteria.settling`).
     - `outcome`: words of `friso.hunting.criteria.run_outcome`.
@@ -152,7 +152,7 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         for column, times in ((in_the_end, settling_in_the_end), (settling, settling_of_runs)):
             after = times(flat, runs, band)
             column.append(np.where(stays & np.isfinite(after), after, np.nan))
-    done = results.statuses == Status.DONE
+    done, end = results.statuses == Status.DONE, run_ends(runs, turns, "outer")
 
     def finished(array: np.ndarray) -> np.ndarray:
         """Replace the entries of an array, (runs,), by NaN where the run was not completed."""
@@ -162,10 +162,10 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         peaks=np.where(done, turns.peaks.sum(axis=1), 0),
         distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
         peak_to_peak=finished(swing_of(runs)),
-        period=finished(turns.period),
+        period=finished(np.where(swings_on(end, 0.0), turns.period, np.nan)),
         settling_time=(finished(settling[0]), finished(settling[1])),
         in_the_end=(finished(in_the_end[0]), finished(in_the_end[1])),
-        outcome=outcomes(run_ends(runs, turns, "outer"), BAND, passing),
+        outcome=outcomes(end, BAND, passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
@@ -206,7 +206,7 @@ def measure_traces(
         peaks=np.where(done, turns.peaks.sum(axis=1), 0),
         distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
         peak_to_peak=np.where(done, end.swing, np.nan),
-        period=np.where(done, turns.period, np.nan),
+        period=np.where(done & swings_on(end, 0.0), turns.period, np.nan),
         settling_time=(settled(places, 0), settled(places, 1)),
         in_the_end=(settled(places[-1:], 0), settled(places[-1:], 1)),
         outcome=outcomes(end, BAND, passing),

@@ -46,8 +46,8 @@ def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
     """Return a new folder in `root`, whose name begins with `prefix`, and its lock.
 
-    Before the lock is held, another process may remove the folder, and filelock makes it again, readable for others.
-    Then another folder is tried.
+    Before the lock is held, another process may remove the folder, and filelock makes it again, readable for others, or
+    fails because it is removed once more. Then another folder is tried.
     """
     folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
     folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever if Windows allows no folder (python/cpython#66305)
@@ -63,7 +63,7 @@ def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Pa
     except BaseException as error:
         held.release()
         remove_folder(folder)
-        if isinstance(error, FileNotFoundError) and tries > 1:
+        if isinstance(error, (FileNotFoundError, FileExistsError)) and tries > 1:
             return _made_and_locked(root, prefix, lock, tries - 1)
         raise
 

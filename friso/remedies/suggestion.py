@@ -9,6 +9,7 @@ import numpy as np
 from friso.design_method.isolator import isolated
 from friso.equations.bandwidth import faster
 from friso.equations.breakaway import least_breakaway
+from friso.equations.scaled_friction import least_static_factor, static_frictions, with_static_friction
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting import find_attractors
@@ -26,9 +27,9 @@ DAMPING = (0.05, DAMPING_RATIOS[1])
 class Suggestion:
     """A joint tried in a rigid stage, and the `stage` with that joint.
 
-    `settles` is true if the stage hunts neither at its bandwidth nor at this bandwidth divided by `Goal.distance`.
-    `margin` is the least modulus margin of the limit cases, and of all states stuck under a bias force. If no joint
-    settles, this is the last one tried.
+    `settles` is true if the stage does not hunt, neither as it is, nor with its bandwidth divided by `Goal.distance`,
+    nor with static friction multiplied or divided by it, down to Coulomb friction. `margin` is the least modulus margin
+    of the limit cases, and of all states stuck under a bias force. If no joint settles, this is the last one tried.
     """
 
     stage: Stage
@@ -61,8 +62,12 @@ def suggestion(stage: Stage) -> Suggestion | None:
     numbers = remedy.changes(shares)
     flat = {**free.flat(), **numbers, "motion.kind": "release"}  # only attractors matter, not the motion
     attracts = np.zeros(len(tried), bool)
-    for factor in (1.0, 1 / Goal.distance):
-        attracted = find_attractors(faster(flat, factor), len(tried), close_orbits=False)
+    machines = [flat, faster(flat, 1 / Goal.distance)]
+    if static_frictions(flat):
+        factors = max(1 / Goal.distance, least_static_factor(flat)), Goal.distance
+        machines += [with_static_friction(flat, factor) for factor in factors]
+    for machine in machines:
+        attracted = find_attractors(machine, len(tried), close_orbits=False)
         attracts |= attracted.attracts | ~attracted.certain
     for number in np.flatnonzero(~attracts):
         settled = remedy.tuned(shares[number])

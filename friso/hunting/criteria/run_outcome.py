@@ -74,15 +74,20 @@ def lasts(
     return (swing > 2 * np.asarray(band)) & (swing >= lasting * np.asarray(earlier))
 
 
+def swings_on(end: End, band: np.ndarray | float) -> np.ndarray:
+    """Return which runs swing by more than twice the `band` [m] to their end, again and again, (runs,)."""
+    with np.errstate(invalid="ignore"):
+        return lasts(end.swing, end.earlier, band) & (end.ended - end.turned <= end.period)
+
+
 def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
     """Return swings, creeps, rests or failed for every run, shape (runs,).
 
     A run rests if it left the band [m] for the last time more than `hold` [s] before its end.
     """
     with np.errstate(invalid="ignore"):
-        swings = lasts(end.swing, end.earlier, band) & (end.ended - end.turned <= end.period)
         rests = end.outside + hold < end.ended
-    words = np.where(swings, SWINGS, np.where(rests, RESTS, CREEPS))
+    words = np.where(swings_on(end, band), SWINGS, np.where(rests, RESTS, CREEPS))
     return np.where(end.completed, words, FAILED).astype(object)
 
 

@@ -103,6 +103,7 @@ def _case(case: Case) -> dict[str, Any]:
         "settles_below": _end(judgement.lower),
         "static_friction": _parameter_margin(case.static_friction) if case.static_friction else None,
         "advice_keeps_friction": case.advice_keeps_friction,
+        "slower_keeps_friction": case.slower_keeps_friction,
         "kick": _kick(judgement),
         "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,

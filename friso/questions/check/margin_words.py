@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from friso.equations.scaled_friction import static_frictions
+from friso.equations.scaled_friction import least_static_factor, static_frictions
 from friso.hunting import SEARCH_LIMITS
 from friso.quantities import percent, plain_factor
 from friso.shown.drawing.prefixes import (
@@ -63,7 +63,19 @@ def joint_sentences(margins: Mapping[str, ParameterMargin]) -> list[str]:
 
 def margin_ways(margin: ParameterMargin) -> list[str]:
     """Return the ranges of multiples of a parameter within which the verdict changes, in words."""
-    return [_way(side, end) for side in (-1, 1) if (end := margin.end(side))]
+    return [_way(end) for side in (-1, 1) if (end := margin.end(side))]
+
+
+def other_static_friction(flat: Mapping[str, Any]) -> str:
+    """Name the static friction that advice allows for, "with static friction 1.2 times as high or as low".
+
+    `flat` has the stage's keys in SI. The text is empty for a law without static or Coulomb friction.
+    """
+    if not static_frictions(flat):
+        return ""
+    distance = SEARCH_LIMITS.edge_distance
+    lower = "as low as Coulomb friction" if least_static_factor(flat) > 1 / distance else "as low"
+    return f"with static friction {distance:g} times as high or {lower}"
 
 
 def thin_margins(case: Case) -> list[str]:
@@ -78,7 +90,7 @@ def thin_margins(case: Case) -> list[str]:
     for side in (-1, 1):
         end = friction.end(side) if friction and not friction.attracts else None
         if end and max(end.same, 1 / end.same) < distance:
-            thin.append(f"static friction of {plain_factor(end.other)} times yours")
+            thin.append(f"static friction {_way(end)}")
     return thin
 
 
@@ -87,22 +99,17 @@ def _side(side: int) -> str:
     return "below" if side < 0 else "above"
 
 
-def _way(side: int, end: MarginEnd) -> str:
+def _way(end: MarginEnd) -> str:
     """Say between which multiples of a parameter hunting begins or ends.
 
-    `side` is 1 for multiples above the stage's own value, and -1 for those below.
+    One of them is 1 if it is not known how little change is enough.
     """
-    if end.same == 1:  # how little change is enough is not known
-        return f"at {plain_factor(end.other)} times yours or {'less' if side > 0 else 'more'}"
     low, high = _factors(end)
     return f"between {plain_factor(low)} and {plain_factor(high)} times yours"
 
 
 def _factors(end: MarginEnd) -> tuple[float, float]:
     """Return the multiples of a parameter between which hunting begins or ends, rounded as they are told."""
-    if end.same == 1:
-        stated = float(plain_factor(end.other))
-        return stated, stated
     low, high = sorted((end.same, end.other))
     return rounded_down(low), rounded_up(high)
 

@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
-from friso.equations.scaled_friction import least_static_factor
 from friso.hunting import MORE_WORK, SEARCH_LIMITS, CheckPart
 from friso.hunting.criteria import ATTRACTED
 from friso.quantities import percent, plain_factor
 from friso.questions.check.feeding_words import feeding_sentences
-from friso.questions.check.margin_words import friction_sentences, thin_margins
+from friso.questions.check.margin_words import friction_sentences, other_static_friction, thin_margins
 from friso.shown.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.shown.drawing.prefixes import (
     digits_that_differ,
@@ -235,11 +234,10 @@ def _transient(case: Case) -> str:
         return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
-    leaks = integral_leak(case.stage.flat()) and case.force_limit is None
+    leaks = _held_by_a_leak(case)
     if leaks and case.peak_to_peak < _TEN_MICRON and judgement.hunting.certain and not judgement.runs_away:
         stays = f"; it is still there after {with_unit(judgement.followed, 's')}" if judgement.followed else ""
-        off = f"{length_at_rest(abs(case.offset))} off its reference"
-        return f"does not hunt ({attracts}), but rests {off}: the leak of its integral holds it there{stays}."
+        return f"does not hunt ({attracts}), but {leaks}{stays}."
     chance = ""
     if judgement.cycle:
         grows = f"a factor of e in {with_unit(judgement.cycle.time_constant, 's')}"
@@ -257,6 +255,13 @@ def _transient(case: Case) -> str:
         time = with_unit(judgement.settled_after, "s")
         says.append(f"It settles to within {band_text(_TEN_MICRON)} in {time}{chance}.")
     return " ".join(says)
+
+
+def _held_by_a_leak(case: Case) -> str:
+    """Say how far off its reference the leak of the integral holds a stage; empty without a leak, or at a limit."""
+    if not integral_leak(case.stage.flat()) or case.force_limit is not None:
+        return ""
+    return f"rests {length_at_rest(abs(case.offset))} off its reference: the leak of its integral holds it there"
 
 
 def _held(case: Case) -> list[str]:
@@ -311,7 +316,7 @@ def _settling_sentence(case: Case) -> str:
     if coarse is not None:
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
         swing = _small_swing(case)
-        finer = f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        finer = _held_by_a_leak(case) or f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
         return f"{within}, but {f'does not stay within {band_text(_MICRON)}{swing}' if swing else finer}."
     if far := _at_the_far_end(case, _TEN_MICRON):
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
@@ -507,10 +512,16 @@ def _holds(windows: Iterable[BandwidthWindow], factor: float) -> bool:
 def _slower(case: Case, end: AttractionEnd) -> str:
     """Say to which bandwidth the controller has to be slowed down for the stage to settle.
 
-    `end` is the lower end of the bandwidths at which hunting attracts. The text says if it is not certain.
+    `end` is the lower end of the bandwidths at which hunting attracts. The bandwidth advised keeps a distance from it,
+    unless the stage hunts, or its loop is unstable, closely below. The text says if the end is not certain.
     """
     doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
-    return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
+    distance, to = SEARCH_LIMITS.edge_distance, case.judgement.slower_advised
+    near = [window.high for window in case.unstable_bandwidths if window.high]
+    if to is None or any(to <= high.inside <= end.outside for high in near):
+        return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)} (just below the edge){doubt}"
+    kept = f"at most 1/{distance:g} of the edge of hunting{_with_other_friction(case, case.slower_keeps_friction)}"
+    return f"lower the bandwidth to {_bandwidth(case, to, up=False)} ({kept}){doubt}"
 
 
 def _faster(case: Case, edge: Margin) -> str:
@@ -523,7 +534,7 @@ def _faster(case: Case, edge: Margin) -> str:
     near = {"the loop becomes unstable": case.unstable_bandwidths, "hunting begins again": case.judgement.windows}
     why = next((f": {comes} closely" for comes, windows in near.items() if _again(edge, windows)), "")
     kept = (
-        f", at least {apart:g} times the edge of hunting{_with_other_friction(case)}"
+        f", at least {apart:g} times the edge of hunting{_with_other_friction(case, case.advice_keeps_friction)}"
         if apart > 1
         else f", just above the edge{why}"
     )
@@ -540,17 +551,13 @@ def _faster(case: Case, edge: Margin) -> str:
     return f"make the controller {plain_factor(factor)} times faster{kept} ({', '.join(gains)}){doubt}"
 
 
-def _with_other_friction(case: Case) -> str:
-    """Say whether the bandwidth advised keeps a margin in static friction.
+def _with_other_friction(case: Case, kept: bool | None) -> str:
+    """Say whether the bandwidth advised is `kept` free of hunting with other static friction.
 
     The text is empty if this was not examined.
     """
-    if case.advice_keeps_friction is None:
-        return ""
-    distance = SEARCH_LIMITS.edge_distance
-    lower = "as low as Coulomb friction" if least_static_factor(case.stage.flat()) > 1 / distance else "as low"
-    friction = f"with static friction {distance:g} times as high or {lower}"
-    return f", also {friction}" if case.advice_keeps_friction else f"; but hunting returns there {friction}"
+    friction = other_static_friction(case.stage.flat())
+    return "" if kept is None else f", also {friction}" if kept else f"; but hunting returns there {friction}"
 
 
 def _distance(case: Case, edge: Margin) -> float:
