@@ -170,6 +170,9 @@ def test_nothing_is_shaded_where_swings_to_one_side_differ_and_that_is_said() ->
     even = figure_of("return-map", both_joints())
     assert even.panels[0].bands
     assert "nothing is shaded" not in even.caption
+    bounded = hunts(hunting=fake_hunting(fake_cycle(), fake_cycle(symmetric=False, multiplier=1.2)))
+    beside = figure_of("return-map", {"given": replace(fake_case(hunting=True), judgement=bounded)})
+    assert beside.panels[0].bands  # a pair of leaning cycles bounds the basin of a symmetric stage
 
 
 def test_return_map_with_the_swings_of_this_motion():

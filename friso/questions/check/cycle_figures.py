@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from friso.shown.cases import ShownCase
 from friso.shown.drawing.figure import GREY, INK, Array, Axis, Band, Dash, Figure, Markers, Panel, Series
 
 if TYPE_CHECKING:
-    from friso.hunting import Cycle, Hunting
+    from friso.hunting import Cycle
 
 _VIEW = 2.2  # reach of a return map's axes, relative to the largest cycle
 _STARTS, _FOLLOWED = 401, 300  # number of distances followed by a return map, and number of swings followed
@@ -29,20 +30,15 @@ def return_map_figure(cases: list[ShownCase]) -> Figure:
     """
     panels = tuple(panel for item in cases for panel in _return_map(item))
     caption = (
-        "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
-        "the previous one. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
-        "hunting cycle, which attracts if the curve is less steep there than the diagonal; where it stays below, "
-        "swings die out. The thin line is this motion after its last move. Shaded are the distances from which swings "
-        "end in hunting, by this curve. Beyond its ends the stage does not swing past its target."
+        "Each turning point of a stage that sticks and then swings past its target (curve: from the positive side), "
+        "against the one before: where the curve crosses the dashed diagonal lies a hunting cycle, which attracts if "
+        "the curve is less steep there than the diagonal. The thin line is this motion after its last move, off the "
+        "curve while it turns without sticking. Shaded are the distances from which swings end in hunting."
     )
-    if any((joint := item.case.stage.joint) and not joint.locked for item in cases):
-        caption += (
-            " A stage on a free joint turns farther out than the point where its cart sticks, slightly off the curve."
-        )
     hunting = [(item.label, item.case.judgement.hunting) for item in cases]
     without = [(label, search.reason) for label, search in hunting if search.reason and not search.cycles]
     caption += "".join(f" {label}: no cycle, as {reason}." for label, reason in without)
-    uneven = [label for label, search in hunting if search.attracting and not _mirrored(search)]
+    uneven = [label for label, search in hunting if search.attracting and not _mirrored(search.cycles)]
     caption += "".join(
         f" {label}: nothing is shaded, as swings to one side differ from those to the other." for label in uneven
     )
@@ -71,13 +67,13 @@ def _return_map(item: ShownCase) -> list[Panel]:
     if swings.size > 2:
         series.append(Series(swings[1:-1], swings[2:], "this motion", INK, width=0.8))
     x, y = Axis("This swing", "m", (0.0, reach)), Axis("Next swing", "m", (0.0, reach))
-    basins = _basins(distances, returns, reach) if hunting.attracting and _mirrored(hunting) else ()
+    basins = _basins(distances, returns, reach) if hunting.attracting and _mirrored(hunting.cycles) else ()
     return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles), bands=basins)]
 
 
-def _mirrored(hunting: Hunting) -> bool:
-    """Tell whether swings to both sides are alike (all cycles symmetric): one curve shows both."""
-    return bool(hunting.cycles) and all(cycle.symmetric for cycle in hunting.cycles)
+def _mirrored(cycles: Sequence[Cycle]) -> bool:
+    """Tell whether swings to both sides are alike, as a symmetric cycle shows: one curve is then enough for both."""
+    return any(cycle.symmetric for cycle in cycles)
 
 
 def _basins(distances: Array, returns: Array, reach: float) -> tuple[Band, ...]:
@@ -115,7 +111,7 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
 
     If a cycle is symmetric, mirror images are marked as well.
     """
-    mirrored = any(cycle.symmetric for cycle in cycles)
+    mirrored = _mirrored(cycles)
     markers = []
     for attracts, label in _WORDS.items():
         position = [samples(cycle.trace, "position") for cycle in cycles if cycle.attracts == attracts]
