@@ -16,7 +16,15 @@ from friso.equations.scaled_friction import (
     with_friction,
     with_static_friction,
 )
-from friso.hunting import MarginEnd, ParameterMargin, check, find_attractors, joint_margins
+from friso.hunting import (
+    AttractionEnd,
+    BandwidthWindow,
+    MarginEnd,
+    ParameterMargin,
+    check,
+    find_attractors,
+    joint_margins,
+)
 from friso.hunting import parameter_margin as module
 from friso.hunting.parameter_margin import parameter_margin
 from friso.questions.check.document import joint_margins_document
@@ -126,6 +134,14 @@ def test_a_margin_is_told_with_both_of_its_ends() -> None:
     assert "2.93 to 3.20 N" in sentence  # less 1 N
     already = ParameterMargin(False, None, MarginEnd(1.0, 1.08, True), (1 / 3, 3.0))
     assert "between 1 and 1.08 times" in margin_sentence("static friction", already)
+
+
+def test_the_lower_bandwidth_advised_keeps_a_factor_from_hunting() -> None:
+    """Below 0.5 of its own a stage does not hunt, but from 0.3 to 0.4 it does: 0.5/1.2 is too near to that window."""
+    lower, again = AttractionEnd(0.51, 0.5, True), BandwidthWindow(None, AttractionEnd(0.4, 0.41, True))
+    assert hunts(lower=lower).slower_advised == pytest.approx(0.5 / 1.2)
+    assert hunts(lower=lower, windows=(again,)).slower_advised is None
+    assert hunts(lower=AttractionEnd(0.29, 0.28, True)).slower_advised is None  # below the bandwidths searched
 
 
 def test_little_reserve_is_told_with_what_brings_hunting_back() -> None:
