@@ -20,7 +20,7 @@ from friso.cli.common import print_table, print_wrapped, say
 from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
-from friso.platform.interrupts import answers_interrupts
+from friso.platform.interrupts import answers_interrupts, whole_answer
 from friso.platform.system import cause_of, path_of
 from friso.progress import Progress
 
@@ -69,7 +69,8 @@ def ask(question: Question, about: Sequence[Any], options: Mapping[str, Any], sh
         with ProgressBar(question.during) as progress, named_as_options(question.options):
             answer = question.function(*about, **options, **kept, progress=progress)
         speak_of(answer.axis_kind)
-        show(answer, shown, None if target is None else lambda progress: target.write(answer.files(), progress))
+        with whole_answer():
+            show(answer, shown, None if target is None else lambda progress: target.write(answer.files(), progress))
 
 
 def tried(write: Callable[[], list[Path]], nothing: str) -> tuple[list[Path], str]:

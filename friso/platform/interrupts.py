@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -119,6 +119,16 @@ def hold_interrupts() -> Iterator[None]:
             signal.signal(number, handler)
         if arrived:
             signal.raise_signal(arrived[0])
+
+
+@contextmanager
+def whole_answer() -> Iterator[None]:
+    """Make Ctrl-C wait until an answer is shown and its files are written, if the command has begun to answer it.
+
+    Minutes of work would be lost for the seconds of a drawing.
+    """
+    with nullcontext() if _bounded else hold_interrupts():
+        yield
 
 
 def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:

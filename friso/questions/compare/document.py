@@ -11,7 +11,7 @@ from friso.hunting.criteria import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria import OUTCOME_CRITERION as OUTCOME
 from friso.questions.compare.words import sentences
 from friso.shown.documents import plain_json
-from friso.studies.compare.study import ENOUGH, Comparison, OptionResult
+from friso.studies.compare.study import Comparison, OptionResult
 
 
 def compare_document(comparison: Comparison) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             },
             "within_m": comparison.within,
             "bandwidth_limit_hz": comparison.bandwidth_limit,
-            "needed_bandwidth_hz": _needed(comparison),
+            "needed_bandwidth_hz": comparison.turning,
             "deadband_m": comparison.options.deadband,
             "sample_time_s": comparison.stage.flat()["drive.sample_time"],
             "from_file": [*machines.from_file],
@@ -47,16 +47,6 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "notes": [*comparison.notes],
         }
     )
-
-
-def _needed(comparison: Comparison) -> float | None:
-    """Return the bandwidth [Hz] at which the controller alone brings enough machines to rest.
-
-    It is None if no bandwidth tried does, or if this was not computed.
-    """
-    needed = comparison.needed
-    at = None if needed is None else needed.turning(ENOUGH)
-    return None if needed is None or at is None else float(needed.bandwidths[at])
 
 
 def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:

@@ -205,17 +205,19 @@ def _turning(comparison: Comparison) -> list[str]:
     if needed is None or base.rests:
         return []
     enough, last = f"{percent(ENOUGH)} of the machines", len(needed.shares) - 1
-    at, hertz = needed.turning(ENOUGH), [with_unit(float(value), "Hz") for value in needed.bandwidths]
-    if at is None:
+    least, hertz = comparison.turning, [with_unit(float(value), "Hz") for value in needed.bandwidths]
+    if least is None:
         share = _share_at(needed, last)
         return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
-    if at == 0:
+    told = with_unit(least, "Hz")
+    lower = [number for number, value in enumerate(needed.bandwidths) if value < least and hertz[number] != told]
+    if not lower:
         return []
     others = [result for result in _resting(comparison) if result.option.factor == 1.0]
     return [
-        f"A faster controller alone needs a bandwidth of {hertz[at]} or more, where the loop last crosses 0 dB, to "
-        f"bring {enough} to rest after their moves (at {hertz[at - 1]}: {_share_at(needed, at - 1)}). A drive limited "
-        f"to less needs {_names(others) if others else 'something else'}."
+        f"A faster controller alone needs a bandwidth of {told} or more, where the loop last crosses 0 dB, to bring "
+        f"{enough} to rest in the end (at {hertz[lower[-1]]}: {_share_at(needed, lower[-1])}). A drive limited to less "
+        f"needs {_names(others) if others else 'something else'}."
     ]
 
 
@@ -265,14 +267,13 @@ def conclusion(comparison: Comparison) -> str:
 
 
 def _too_late(resting: Sequence[OptionResult]) -> str:
-    """Say with which options half of the machines miss the far end of their motion in time.
+    """Say with which options too many machines miss the far end of their motion in time, and how many are there.
 
     The text is empty if there is no such option.
     """
-    late = [result for result in resting if not np.isfinite(result.settling.value)]
-    if not late:
-        return ""
-    return f"With {_names(late)} at least half of them are not in position at the far end before the reference returns."
+    there = [(result, float(np.isfinite(result.measures.settling).mean())) for result in resting]
+    late = [f"{percent(fraction, 3)} with {in_prose(result)}" for result, fraction in there if fraction < ENOUGH]
+    return f"At the far end, before the reference returns, {listed(late, 'and')} are in position." if late else ""
 
 
 def _number(result: OptionResult, count: int) -> str:

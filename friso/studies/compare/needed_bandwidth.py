@@ -13,7 +13,7 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.structure import shared_structure
 from friso.frequency.bandwidth import bandwidths_at
 from friso.frequency.crossover import limits
-from friso.hunting.criteria import settling_of_runs
+from friso.hunting.criteria import settling_in_the_end
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.stage.rig import AS_BUILT
@@ -24,15 +24,17 @@ from friso.studies.settings import StudySettings
 
 @dataclass(frozen=True)
 class NeededBandwidth:
-    """Fractions of drawn machines that come to rest by the controller alone, over bandwidth.
+    """Fractions of drawn machines that come to rest in the end by the controller alone, over bandwidth.
 
     `bandwidths` [Hz], shape (n,), are the last 0 dB crossings of the stage's own open loop, with ever faster
     controllers. They run from the present one to the highest that keeps enough margin. `shares`, shape (n,), are the
-    fractions. The joint is locked, and the controller in continuous time.
+    fractions, and `factors`, shape (n,), say how much faster the controllers are. The joint is locked, and the
+    controller in continuous time.
     """
 
     bandwidths: np.ndarray
     shares: np.ndarray
+    factors: np.ndarray
 
     def turning(self, enough: float) -> int | None:
         """Return the index of the bandwidth from which on enough machines come to rest.
@@ -66,5 +68,5 @@ def needed_bandwidth(machines: Machines, locked: Stage, within: float) -> Needed
     options = RunOptions(rtol=settings.needed_rtol, bands=(within, within), record_from=np.inf)
     for runs in run_chunks(kernel(shared_structure(every)), every, len(rests), options):
         done = np.equal(runs.results.statuses, Status.DONE)
-        rests[runs.numbers] = done & np.isfinite(settling_of_runs(runs.part(every), runs, "inner"))
-    return NeededBandwidth(bandwidths_at(ideal, factors), rests.reshape(tried, count).mean(axis=1))
+        rests[runs.numbers] = done & np.isfinite(settling_in_the_end(runs.part(every), runs, "inner"))
+    return NeededBandwidth(bandwidths_at(ideal, factors), rests.reshape(tried, count).mean(axis=1), factors)

@@ -184,6 +184,25 @@ class Comparison:
         """
         return self.stage.floor is not None
 
+    @property
+    def turning(self) -> float | None:
+        """Return the bandwidth [Hz] from which on a faster controller alone brings enough machines to rest.
+
+        It is the least bandwidth at which either the controller in continuous time does so, or a faster one on the
+        drive as built. Returns None if none does, or if it was not computed.
+        """
+        needed = self.needed
+        if needed is None:
+            return None
+        at = needed.turning(ENOUGH)
+        built = (
+            result.option.factor
+            for result in self.results
+            if result.rests and result.option.factor > 1 and not result.option.kind.joint
+        )
+        found = [float(np.interp(factor, needed.factors, needed.bandwidths)) for factor in built]
+        return min([*found, *([] if at is None else [float(needed.bandwidths[at])])], default=None)
+
     def paired(self, result: OptionResult) -> Paired:
         """Compare an option with option a, on the machines whose runs were completed with both."""
         runs, base = result.measures, self.results[0].measures
