@@ -274,7 +274,7 @@ def tune(
         fresh,
         seed,
         interrupted,
-        session.tried_less or not interrupted,
+        session.tried_less or session.is_least or not interrupted,
         sensitivities,
         {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations,

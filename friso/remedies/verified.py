@@ -23,7 +23,7 @@ from friso.remedies.search import TriedPoints
 from friso.remedies.settings import RemedySettings
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.window import VariableWindow
-from friso.shares import Share, share
+from friso.shares import DOUBT, Share, share
 from friso.stage import Stage
 from friso.studies.compare.options import linear_flat
 from friso.studies.compare.statistics import quantile_interval
@@ -198,16 +198,28 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     """Return the first and last index of the stretch of moves that best meets the goal.
 
     `meets` is true where a move meets the goal, in ascending order of moves. Counted inwards from either end of the
-    stretch, at least the fraction `share` meets it, however many moves are counted. Returns None if no stretch is long
-    enough to show that.
+    stretch, at least the fraction `share` meets it, however many moves are counted. The stretch reaches to the first or
+    last move if the misses beyond its end may be chance: one miss among the last few moves ends no range. Returns None
+    if no stretch is long enough to show that.
     """
+    from scipy.special import bdtrc
+
     if meets.all():
         return 0, len(meets) - 1
     sums = np.cumsum(np.append(0.0, np.where(meets, 1 - share, -share)))
     gains = np.where(np.tri(len(meets), dtype=bool).T, sums[1:] - sums[:-1, None], -np.inf)
     first, last = np.unravel_index(int(gains.argmax()), gains.shape)
     in_places, fewest = gains[first, last] / (1 - share), 1 / (1 - share)
-    return (int(first), int(last)) if round(in_places) >= round(fewest) else None
+    if round(in_places) < round(fewest):
+        return None
+
+    def by_chance(beyond: np.ndarray) -> bool:
+        """Tell whether so many misses are no surprise, if the goal is met by the fraction `share`."""
+        misses = int(np.count_nonzero(~beyond))
+        return not misses or bdtrc(misses - 1, len(beyond), 1 - share) >= DOUBT
+
+    low, high = 0 if by_chance(meets[:first]) else int(first), len(meets) - 1 if by_chance(meets[last + 1 :]) else last
+    return low, int(high)
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,7 @@ def check(
         Draw so many stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt; default:
         as many as a fixed work allows, some tens, and none if the loop is unstable.
     laws : bool
-        Give also the verdict under every friction law that fits the same measurements.
+        Give also the verdict under other friction laws, which keep what was measured as far as they can.
 
     Returns
     -------

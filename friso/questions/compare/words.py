@@ -251,8 +251,9 @@ def conclusion(comparison: Comparison) -> str:
     within, count = with_unit(comparison.within, "m"), comparison.machines.count
     if not resting:
         best = max(comparison.results, key=lambda result: result.in_position_count)
+        none = "None of these options" if comparison.not_run else "No option"
         return (
-            f"No option brings {percent(ENOUGH)} of the {count} machines to rest within {within}. The best is "
+            f"{none} brings {percent(ENOUGH)} of the {count} machines to rest within {within}. The best is "
             f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
         )
     first, *further = resting
@@ -304,8 +305,8 @@ def _as_is(comparison: Comparison) -> str:
 
 
 def _recommendation(comparison: Comparison) -> list[str]:
-    """Say whether to buy a joint; empty if no option brings the machines to rest."""
-    resting = _resting(comparison)
+    """Say whether to buy a joint; empty if no option brings the machines to rest, or if not all were run."""
+    resting = [] if comparison.not_run else _resting(comparison)
     joint = [result for result in resting if result.option.kind.joint]
     settings = [result for result in resting if not result.option.kind.joint]
     if any(result is comparison.results[0] for result in settings):

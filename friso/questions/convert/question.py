@@ -49,7 +49,7 @@ def convert(
     set: Changes = None,
     progress: Progress = silent,
 ) -> ConvertAnswer:
-    """Convert friction to another law that fits the same measurements, and say what could not be kept.
+    """Convert friction to another law that keeps what was measured, and say what could not be kept.
 
     Parameters
     ----------

@@ -43,7 +43,16 @@ def as_it_is(tuning: Advice) -> str:
     else:
         surely_none = certain and verdict != "failed" and "verdict" not in tuning.unmet
         own = f"{'no' if surely_none else 'perhaps a'} limit cycle, but"
-    return f"As it is: {own} {listed([_missed(name, tuning) for name in tuning.unmet], 'and')}."
+    names = [*tuning.unmet, *(["together"] if _others_miss_too(tuning) else [])]
+    return f"As it is: {own} {listed([_missed(name, tuning) for name in names], 'and')}."
+
+
+def _others_miss_too(tuning: Advice) -> bool:
+    """Tell whether clearly more machines miss the goal than miss the parts of it that are named."""
+    meets = tuning.present.meets(tuning.goal)
+    missing = [float(np.mean(~meets[name])) for name in tuning.unmet if name in meets]
+    together = float(np.mean(~np.all([*meets.values()], axis=0)))
+    return bool(missing) and "hunting" not in tuning.unmet and together >= sum(missing) + 0.01
 
 
 def _missed(name: str, tuning: Advice) -> str:

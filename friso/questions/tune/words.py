@@ -508,7 +508,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
         f"{best:.{digits_that_differ((best, goal.margin))}g}.",
         "settling": f"{brings} {percent(goal.share)} of the machines to rest in position in time.",
-        "distance": f"{still_settles} in time at {1 / goal.distance:.2f} of its bandwidth: hunting may be too close.",
+        "distance": f"{still_settles} in time at {1 / goal.distance:.2f} of its bandwidth.",
         "force": f"{settle} take more force than there is.",
         "settle": f"{settle} do so too late.",
         "bandwidth": f"Only settings above your bandwidth limit meet the rest of the goal{_lowest(points, goal)}.",

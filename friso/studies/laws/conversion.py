@@ -1,4 +1,4 @@
-"""Convert a friction law to another that fits the same measurements, and report the losses."""
+"""Convert a friction law to another that keeps what was measured, and report the losses."""
 
 from __future__ import annotations
 
