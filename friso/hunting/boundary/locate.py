@@ -137,12 +137,15 @@ def _enclosed(
 def _predicted(places: np.ndarray, distances: np.ndarray) -> float:
     """Return where a distance passes zero, by a cubic through the four values nearest to zero.
 
-    `distances`, shape (n,), are the values at `places`, which the cubic gives as a function of them.
+    `distances`, shape (n,), are the values at `places`, which the cubic gives as a function of them. The result is NaN
+    or infinite if two of these values are equal.
     """
     nearest = np.argsort(np.abs(distances))[:4]
     at, values = places[nearest], distances[nearest]
     others = [np.delete(values, k) for k in range(len(values))]
-    return float(sum(place * np.prod(rest / (rest - own)) for place, own, rest in zip(at, values, others, strict=True)))
+    with np.errstate(all="ignore"):
+        weights = [np.prod(rest / (rest - own)) for own, rest in zip(values, others, strict=True)]
+    return float(at @ weights)
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
