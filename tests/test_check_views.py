@@ -572,6 +572,18 @@ def test_where_the_loop_is_unstable_friction_is_not_said_to_make_the_stage_hunt(
     assert sentence(settles(), unstable_bandwidths=(below,)).count("5.60 Hz") == 1  # not as the edge of hunting, too
 
 
+def test_a_leak_is_told_only_where_it_holds_the_stage_off() -> None:
+    """Beyond 1 um for good; a far end that is missed in time, or a swing, has another reason."""
+    stage = fake_stage()
+    stage.flat = lambda: {"controller.integral_leak": 0.05}
+    coarse = {"settling_time": {1e-6: None, 1e-5: 2.0}}
+    held = sentence(settles(), stage=stage, offset=7e-6, in_the_end={1e-6: None, 1e-5: 2.0}, **coarse)
+    assert "rests 7.00 µm off its reference: the leak" in held
+    far = sentence(settles(), stage=stage, offset=2e-7, in_the_end={1e-6: 4.0, 1e-5: 2.0}, **coarse)
+    assert "leak" not in far
+    assert "at the far end" in far
+
+
 def test_no_bandwidth_is_advised_at_which_the_loop_is_unstable() -> None:
     """The edge of hunting lies at 9.75 Hz: with an unstable loop from 10.4 Hz on no distance is kept from it, and with
     one from 9.6 Hz on no bandwidth above it is advised."""

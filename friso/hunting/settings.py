@@ -190,7 +190,7 @@ class CheckSettings(Settings):
     """Work for the margin in static friction, as a fraction of that of a case."""
 
     advice_work_share: float = setting(0.1, "")
-    """Work for two stages that show whether advice keeps a margin, as a fraction of that of a case."""
+    """Work for two stages that show whether a bandwidth advised keeps a margin, as a fraction of that of a case."""
 
     check_work: float = setting(8e8, "")
     """Work of a check, about 10 s on one core. Stages that need more say what was left out."""

@@ -52,8 +52,8 @@ class Prior:
     """Prior knowledge of the machine for the analysis of an experiment.
 
     `stage` may be None. `from_user` tells whether the user gave the stage, so that its controller is the machine's.
-    `estimates` are results of earlier experiments, by key. `made_up` are the keys of the stage that were made up for a
-    log, because the file lacks their tables.
+    `estimates` are results of experiments of earlier kinds, by key. `made_up` are the keys of the stage that were made
+    up for a log, because the file lacks their tables.
     """
 
     stage: Stage | None = None

@@ -244,8 +244,11 @@ def _analysed(kind: str, prior: Prior, settings: AnalysisSettings, group: Sequen
 
     `prior` has the stage and the estimates from experiments of the kinds before.
     """
-    progress(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
-    return KINDS[kind].analyse(group, prior, replace(settings, progress=progress))
+    label = f"{kind}: {', '.join(log.name for log in group)}"
+    progress(0, 0, label)
+    result = KINDS[kind].analyse(group, prior, replace(settings, progress=progress))
+    progress(1, 1, label)
+    return result
 
 
 def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -125,10 +125,26 @@ def hold_interrupts() -> Iterator[None]:
 def whole_answer() -> Iterator[None]:
     """Make Ctrl-C wait until an answer is shown and its files are written, if the command has begun to answer it.
 
-    Minutes of work would be lost for the seconds of a drawing.
+    Minutes of work would be lost for the seconds of a drawing. A second Ctrl-C does not wait.
     """
-    with nullcontext() if _bounded else hold_interrupts():
+    if _bounded or threading.current_thread() is not threading.main_thread():
         yield
+        return
+    arrived: list[int] = []
+
+    def first_waits(number: int, frame: FrameType | None) -> None:
+        arrived.append(number)
+        if len(arrived) > 1:
+            _arrived(number, frame)
+
+    before = _take(first_waits)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if arrived:
+            signal.raise_signal(arrived[0])
 
 
 def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:

@@ -199,8 +199,8 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
 
     `meets` is true where a move meets the goal, in ascending order of moves. Counted inwards from either end of the
     stretch, at least the fraction `share` meets it, however many moves are counted. The stretch reaches to the first or
-    last move if the misses beyond its end may be chance: one miss among the last few moves ends no range. Returns None
-    if no stretch is long enough to show that.
+    last move if as many misses as lie beyond its end are not unlikely (5 %). Returns None if no stretch is long enough
+    to show that.
     """
     from scipy.special import bdtrc
 
@@ -216,7 +216,7 @@ def longest_run(meets: np.ndarray, share: float) -> tuple[int, int] | None:
     def by_chance(beyond: np.ndarray) -> bool:
         """Tell whether so many misses are no surprise, if the goal is met by the fraction `share`."""
         misses = int(np.count_nonzero(~beyond))
-        return not misses or bdtrc(misses - 1, len(beyond), 1 - share) >= DOUBT
+        return not misses or bdtrc(misses - 1, len(beyond), 1 - share) >= DOUBT * (1 - 1e-9)
 
     low, high = 0 if by_chance(meets[:first]) else int(first), len(meets) - 1 if by_chance(meets[last + 1 :]) else last
     return low, int(high)

@@ -134,7 +134,7 @@ class Tracer:
         The planes pass through `targets`, (planes, 3), with the `normal`, (3,), in the space of place, log distance and
         log time. Cycles that are not found are left out.
         """
-        return [point for point in self._solved(near, targets, normal) if point]
+        return [point for point in self._solved(replace(near, jacobians=None), targets, normal) if point]
 
     def _solved(
         self, near: Point, targets: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None

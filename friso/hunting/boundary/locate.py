@@ -145,7 +145,7 @@ def _predicted(places: np.ndarray, distances: np.ndarray) -> float:
     others = [np.delete(values, k) for k in range(len(values))]
     with np.errstate(all="ignore"):
         weights = [np.prod(rest / (rest - own)) for own, rest in zip(values, others, strict=True)]
-    return float(at @ weights)
+        return float(at @ weights)
 
 
 def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:

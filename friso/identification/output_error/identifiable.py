@@ -101,7 +101,7 @@ def _identifiable_on_log(
     """Fit the stage that follows the log, and find which parameters it determines.
 
     `plain` is the fit of the `core` parameters alone, and `noise` [N] is the force's. Parameters that the motion cannot
-    show are not tried.
+    show are tried only if the others do not explain the record.
     """
     names = follows.names
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
@@ -165,8 +165,8 @@ def believed(
 def _searched_again(full: OutputErrorFit) -> OutputErrorFit:
     """Search all parameters again from the mass and friction of a fit, as long as that finds another optimum.
 
-    Parameters that the motion cannot show are searched too: of small moves that never slide steadily, no model without
-    static friction explains the force. A fit within the noise is no reason to stop: of small moves it was the second of
+    All parameters are searched, also those that the motion cannot show: without static friction no model explains moves
+    too small to slide steadily. A fit within the noise is no reason to stop: of small moves it was the second of
     three optima, and not yet right.
     """
     settings = OutputErrorSettings.current()

@@ -316,7 +316,9 @@ def _settling_sentence(case: Case) -> str:
     if coarse is not None:
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
         swing = _small_swing(case)
-        finer = _held_by_a_leak(case) or f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        off = abs(case.offset) > _MICRON and case.in_the_end.get(_MICRON) is None
+        finer = f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        finer = (off and _held_by_a_leak(case)) or finer
         return f"{within}, but {f'does not stay within {band_text(_MICRON)}{swing}' if swing else finer}."
     if far := _at_the_far_end(case, _TEN_MICRON):
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
@@ -557,7 +559,8 @@ def _with_other_friction(case: Case, kept: bool | None) -> str:
     The text is empty if this was not examined.
     """
     friction = other_static_friction(case.stage.flat())
-    return "" if kept is None else f", also {friction}" if kept else f"; but hunting returns there {friction}"
+    told = f"; nor does it hunt there {friction}" if kept else f"; but hunting returns there {friction}"
+    return "" if kept is None else told
 
 
 def _distance(case: Case, edge: Margin) -> float:

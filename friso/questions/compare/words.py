@@ -210,14 +210,17 @@ def _turning(comparison: Comparison) -> list[str]:
         share = _share_at(needed, last)
         return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
     told = with_unit(least, "Hz")
-    lower = [number for number, value in enumerate(needed.bandwidths) if value < least and hertz[number] != told]
-    if not lower:
+    fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH))
+    if not fewer.size:
         return []
+    at, below = needed.turning(ENOUGH), int(fewer[-1])
+    only_there = at is None or needed.bandwidths[at] > least
+    where = f"at a bandwidth of {told}" if only_there else f"from a bandwidth of {told} on"
     others = [result for result in _resting(comparison) if result.option.factor == 1.0]
     return [
-        f"A faster controller alone needs a bandwidth of {told} or more, where the loop last crosses 0 dB, to bring "
-        f"{enough} to rest in the end (at {hertz[lower[-1]]}: {_share_at(needed, lower[-1])}). A drive limited to less "
-        f"needs {_names(others) if others else 'something else'}."
+        f"A faster controller alone brings {enough} to rest in the end {where}, the last frequency at which the loop "
+        f"crosses 0 dB (at {hertz[below]}: {_share_at(needed, below)}). A drive limited to less needs "
+        f"{_names(others) if others else 'something else'}."
     ]
 
 

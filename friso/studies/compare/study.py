@@ -186,10 +186,10 @@ class Comparison:
 
     @property
     def turning(self) -> float | None:
-        """Return the bandwidth [Hz] from which on a faster controller alone brings enough machines to rest.
+        """Return the least bandwidth [Hz] at which a faster controller alone is known to bring enough machines to rest.
 
-        It is the least bandwidth at which either the controller in continuous time does so, or a faster one on the
-        drive as built. Returns None if none does, or if it was not computed.
+        Either the controller in continuous time does so from there on, or a faster one does so there on the drive as
+        built. Returns None if none does, or if it was not computed.
         """
         needed = self.needed
         if needed is None:
