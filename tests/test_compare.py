@@ -482,12 +482,12 @@ def test_how_many_machines_miss_the_far_end_is_told(made_up: Comparison) -> None
     Such machines do not settle in time.
     """
 
-    def told(time: float) -> str:
+    def words(time: float) -> str:
         base = made_up.results[0]
         result = replace(base, measures=replace(base.measures, settling=np.full(COUNT, time)))
         return " ".join(sentences(replace(made_up, results=(result,))))
 
-    on_time, too_late = told(2.0), told(np.inf)
+    on_time, too_late = words(2.0), words(np.inf)
     assert "far end" not in on_time
     assert "At the far end, before the reference returns, 0 % with the machine as is (a)" in too_late
     assert "to come to rest in the end" in too_late

@@ -72,9 +72,9 @@ class MoveRange:
             stage.with_numbers({key: float(value) for key, value in {**slow, **largest}.items()})
         except StageError as error:
             unit = stage.axis_kind.unit("m")
-            least = exactly(self.smallest, unit)
+            least, most = exactly(self.smallest, unit), exactly(max(self.smallest, float(size(flat))), unit)
             actual = f"a largest move of {exactly(self.largest, unit)}"
-            raise InputError("moves", actual, error.expected, f'"{least}..{least}"') from None
+            raise InputError("moves", actual, error.expected, f'"{least}..{most}"') from None
 
 
 @dataclass(frozen=True)

@@ -559,8 +559,8 @@ def _with_other_friction(case: Case, kept: bool | None) -> str:
     The text is empty if this was not examined.
     """
     friction = other_static_friction(case.stage.flat())
-    told = f"; nor does it hunt there {friction}" if kept else f"; but hunting returns there {friction}"
-    return "" if kept is None else told
+    says = f"; nor does it hunt there {friction}" if kept else f"; but hunting returns there {friction}"
+    return "" if kept is None else says
 
 
 def _distance(case: Case, edge: Margin) -> float:

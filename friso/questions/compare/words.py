@@ -209,13 +209,13 @@ def _turning(comparison: Comparison) -> list[str]:
     if least is None:
         share = _share_at(needed, last)
         return [f"The controller alone does not bring {enough} to rest at any bandwidth up to {hertz[last]} ({share})."]
-    told = with_unit(least, "Hz")
+    turn = with_unit(least, "Hz")
     fewer = np.flatnonzero((needed.bandwidths < least) & (needed.shares < ENOUGH))
     if not fewer.size:
         return []
     at, below = needed.turning(ENOUGH), int(fewer[-1])
     only_there = at is None or needed.bandwidths[at] > least
-    where = f"at a bandwidth of {told}" if only_there else f"from a bandwidth of {told} on"
+    where = f"at a bandwidth of {turn}" if only_there else f"from a bandwidth of {turn} on"
     others = [result for result in _resting(comparison) if result.option.factor == 1.0]
     return [
         f"A faster controller alone brings {enough} to rest in the end {where}, the last frequency at which the loop "

@@ -200,8 +200,8 @@ class Comparison:
             for result in self.results
             if result.rests and result.option.factor > 1 and not result.option.kind.joint
         )
-        found = [float(np.interp(factor, needed.factors, needed.bandwidths)) for factor in built]
-        return min([*found, *([] if at is None else [float(needed.bandwidths[at])])], default=None)
+        bandwidths = [float(np.interp(factor, needed.factors, needed.bandwidths)) for factor in built]
+        return min([*bandwidths, *([] if at is None else [float(needed.bandwidths[at])])], default=None)
 
     def paired(self, result: OptionResult) -> Paired:
         """Compare an option with option a, on the machines whose runs were completed with both."""
