@@ -311,8 +311,9 @@ def _friction(
 
     def kept(factor: float | None) -> bool | None:
         """Tell whether the stage does not hunt with other static friction at a `factor` of its bandwidth."""
-        within = factor is not None and factor <= SEARCH_LIMITS.highest_bandwidth
-        return keeps_friction_margin(stage, factor, settings.advice_work_share * work) if within else None  # type: ignore[arg-type]
+        if factor is None or factor > SEARCH_LIMITS.highest_bandwidth:
+            return None
+        return keeps_friction_margin(stage, factor, settings.advice_work_share * work)
 
     return margin, (kept(higher), kept(lower))
 

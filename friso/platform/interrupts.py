@@ -7,13 +7,14 @@ half-loaded library. So a signal raises KeyboardInterrupt only while no import i
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -103,22 +104,14 @@ def hold_interrupts() -> Iterator[None]:
 
     Outside the main thread, which signals do not reach, it has no effect.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
     global _held
-    arrived: list[int] = []
-    before = _take(lambda number, frame: arrived.append(number))
-    _held += 1
-    try:
-        with _whole:
-            yield
-    finally:
-        _held -= 1
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if arrived:
-            signal.raise_signal(arrived[0])
+    with _signals_wait() as waiting:
+        _held += waiting
+        try:
+            with _whole if waiting else nullcontext():
+                yield
+        finally:
+            _held -= waiting
 
 
 @contextmanager
@@ -127,19 +120,29 @@ def whole_answer() -> Iterator[None]:
 
     Minutes of work would be lost for the seconds of a drawing. A second Ctrl-C does not wait.
     """
-    if _bounded or threading.current_thread() is not threading.main_thread():
+    with nullcontext() if _bounded else _signals_wait(most=1):
         yield
+
+
+@contextmanager
+def _signals_wait(most: float = math.inf) -> Iterator[bool]:
+    """Make signals wait for the end of the block, but not after the first `most`.
+
+    Yields whether they do: outside the main thread, which signals do not reach, they do not.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield False
         return
     arrived: list[int] = []
 
-    def first_waits(number: int, frame: FrameType | None) -> None:
+    def wait(number: int, frame: FrameType | None) -> None:
         arrived.append(number)
-        if len(arrived) > 1:
+        if len(arrived) > most:
             _arrived(number, frame)
 
-    before = _take(first_waits)
+    before = _take(wait)
     try:
-        yield
+        yield True
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

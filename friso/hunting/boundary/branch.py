@@ -142,16 +142,13 @@ class Tracer:
         """Make one attempt to find a cycle on each of several parallel planes; None where none is found.
 
         The planes pass through `targets`, (planes, 3), with the `normal`, (3,). The search starts from the cycle `near`
-        the planes, with its Jacobian if it has one, or from approximate `states` (planes, states).
+        the planes, or from approximate `states` (planes, states). If that cycle has a Jacobian, there may be one plane.
         """
-        count, jacobians = len(targets), near.jacobians
         begin, times, places = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
-        begin, times, places = (np.repeat(values, count, axis=0) for values in (begin, times, places))
-        if states is not None or jacobians is None:
+        if states is not None or near.jacobians is None:
             begin = begin * np.exp(targets[:, 1:2] - near.distance) if states is None else states
             times, places = times * np.exp(targets[:, 2] - near.time), targets[:, 0]
-        jacobians = jacobians if jacobians is None else np.repeat(jacobians, count, axis=0)
-        return self._closed(begin, times, places, targets, normal, jacobians)
+        return self._closed(begin, times, places, targets, normal, near.jacobians)
 
     def _closed(
         self,
