@@ -426,6 +426,8 @@ def test_machines_are_closed_by_keys_and_the_last_one_stays(browsed: Browsed) ->
             "async ([name, text]) => (await import('/state.js')).add(name, text)", [name, RIG.read_text("utf-8")]
         )
     assert page.eval_on_selector_all("#machines > *", "all => all.map(one => one.role)") == ["tab"] * 3
+    # figures of the last machine: the keys, whose heading stands above, are drawn before them
+    page.wait_for_selector("#picture .figure:not(.old, [inert])")
     page.wait_for_selector("#keys h2")
     violations = axe.run(page).response["violations"]
     assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
