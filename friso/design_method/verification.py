@@ -106,7 +106,7 @@ class MachineOutcomes:
 
 @dataclass(frozen=True)
 class Verification:
-    """The machines and moves drawn, with their outcomes for the joint `free` and `locked`.
+    """The machines and moves drawn, with their outcomes for the joint `free` and, of the first ones, `locked`.
 
     `worst` is the worst machine with a free joint, as a stage.
     """
@@ -118,7 +118,7 @@ class Verification:
 
 
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
-    """Try the design in machines and moves drawn from the specification.
+    """Try the design in machines and moves drawn from the specification; the first ones with a locked joint, too.
 
     The load reduces the drive stiffness by up to the fraction `softening`.
     """
@@ -126,11 +126,14 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
     flat = stage.flat()
     machines = random_machines(spec, flat, settings.verified_moves, softening)
     window = float(spec.position.window)
-    outcomes: list[MachineOutcomes] = []
-    for name, held in (("joint free", False), ("joint locked", True)):
-        keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
-        outcomes.append(move_machines(keys, machines.count, window, progress, f"moves, {name}"))
-    free, locked = outcomes
+
+    def moved(count: int, name: str, held: bool) -> MachineOutcomes:
+        drawn = {key: values[:count] for key, values in machines.keys.items()}
+        keys = {**flat, **drawn, "joint.locked": held, "motion.kind": "there_and_back"}
+        return move_machines(keys, count, window, progress, f"moves, {name}")
+
+    free = moved(machines.count, "joint free", False)
+    locked = moved(min(settings.compared_moves, machines.count), "joint locked", True)
     return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 
 

@@ -11,7 +11,7 @@ from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import at_bandwidth, bandwidth
 from friso.equations.structure import shared_structure
-from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable
+from friso.hunting import Margin, find_attractors, judge_many, kernels_to_judge, loops_unstable, sketch_attractors
 from friso.hunting.criteria import ATTRACTED, UNDECIDED, VERDICTS
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
@@ -108,7 +108,9 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
     """Find up to which bandwidth the first drawn stages hunt, near the stage's own `margin`.
 
     The margin is that from the stage to its edge of hunting. The last change between coarse steps of the bandwidth is
-    narrowed down by halving. Returns None if there is no margin, or if the controller has no bandwidth.
+    narrowed down by halving. Coarse return maps tell which stages hunt, so an attractor with a narrow basin may be
+    missed: the edges show their spread, not for certain where each lies. Returns None if there is no margin, or if the
+    controller has no bandwidth.
     """
     settings = StudySettings.current()
     own = bandwidth(stage.flat())
@@ -124,7 +126,7 @@ def edges(stage: Stage, sample: Sample, margin: Margin | None) -> DrawnEdges | N
         if not rows.size:
             return np.zeros(0)
         flat = laid_over(stage, {key: values[rows] for key, values in sample.keys.items()})
-        attracted = find_attractors(at_bandwidth(flat, tried[columns]), len(rows))
+        attracted = sketch_attractors(at_bandwidth(flat, tried[columns]), len(rows))
         return np.where(attracted.certain, attracted.attracts, np.nan)
 
     columns = np.arange(0, steps + 1, coarse)

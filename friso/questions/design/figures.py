@@ -179,8 +179,8 @@ def _settling(design: Design) -> Figure:
     )
     caption = (
         f"The share of the {free.tried} simulated moves that are in position to stay, over the time since the last "
-        "corner of the reference; the same machines with the joint free and locked. If a curve ends below 100 %, the "
-        "remaining moves do not come to rest."
+        f"corner of the reference; {locked.tried} of the same machines with the joint locked. If a curve ends below "
+        "100 %, the remaining moves do not come to rest."
     )
     return Figure("design_settling", "Settling times", caption, (panel,))
 

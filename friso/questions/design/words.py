@@ -149,11 +149,11 @@ def leaf_words(geometry: Geometry) -> str:
 def _verified(design: Design) -> tuple[str, str]:
     """Say how many simulated moves come to rest; return the text and the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
-    held = f" With the joint locked, {restless(locked)}." if locked.missed else ""
+    held = f" With the joint locked, of {locked.tried} {restless(locked)}." if locked.missed else ""
     if design.needed and not locked.missed:
         held = (
-            f" With the joint locked, all do as well: it does not hunt in this sample, but lies closer to the edge of "
-            f"hunting than the safety factor of {design.spec.safety.hunting:g} allows."
+            f" With the joint locked, {locked.tried} do as well: it does not hunt in this sample, but lies closer to "
+            f"the edge of hunting than the safety factor of {design.spec.safety.hunting:g} allows."
         )
     text = f"Of {free.tried} simulated moves {restless(free)}: {probability(free)}. {settling(free)}"
     if limit is None:
