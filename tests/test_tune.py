@@ -846,6 +846,24 @@ def test_the_least_change_of_few_keys_is_sought_among_these_alone(
     assert session.outcomes[1] is (alone if taken else of_three)
 
 
+def test_ranges_are_sought_by_the_search_of_their_own_remedy(
+    machines: Fleet, tuning: Advice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two remedies had one name: a later search for fewer keys ended without a smaller change."""
+    (works,) = tuning.working
+    keys = of_key("controller.crossover", 1, 50, 8), of_key("controller.alpha", 0.05, 0.5, 0.1)
+    two, one = (Remedy("gains: the least change", tuning.stage, keys[:count]) for count in (2, 1))
+    made: Any = [tuning.stage, tuning.stage, tuning.goal, *[machines] * 4, TINY, method._Report(lambda *_: None, 1)]
+    session = _Session(*made)
+    for remedy in (two, one):
+        session._begun(remedy, 1)
+    session.outcomes = [replace(works, remedy=two, shares=np.full(2, 0.5), windows=())]
+    asked: list[Remedy] = []
+    monkeypatch.setattr(method, "windows", lambda search, shares: asked.append(search.remedy) or ())
+    session.adds_windows()
+    assert asked == [two]
+
+
 @pytest.mark.parametrize(
     ("doubt", "work", "verified"),
     [("given up", 1e9, 1), ("distance", 1e9, RemedySettings().most_tries), ("distance", 1.0, 1)],

@@ -314,7 +314,7 @@ def machines_of_search(
 class _Session:
     """Search for remedies of one stage: what was tried, how it ended, and what is next.
 
-    `outcomes` are the results so far, `searching` is the current search, and `searches` has all searches by remedy.
+    `outcomes` are the results so far, `searching` is the current search, and `searches` has all searches.
     While `least_factor` is true, the smallest bandwidth that works is searched; `is_least` is true if it was found.
     `allowed` limits the work of all remedies together. Settings are searched on `machines`, and verified on `unseen`
     ones, then on `further` ones if the result is unclear.
@@ -335,7 +335,7 @@ class _Session:
     least_factor: bool = False
     is_least: bool = False
     allowed: Allowance | None = None
-    searches: dict[str, Search] = field(default_factory=dict)
+    searches: list[Search] = field(default_factory=list)
     unmade: dict[str, Unmade] = field(default_factory=dict)
 
     @property
@@ -404,8 +404,8 @@ class _Session:
         for place, outcome in enumerate(self.outcomes):
             if any(outcome is one for one in shown) and not outcome.windows:
                 self.report(f"{outcome.remedy.name}: how far each number may vary")
-                around = windows(self.searches[outcome.remedy.name], outcome.shares)
-                self.outcomes[place] = replace(outcome, windows=around)
+                search = next(one for one in self.searches if one.remedy is outcome.remedy)  # names may be equal
+                self.outcomes[place] = replace(outcome, windows=windows(search, outcome.shares))
 
     def tries(self, remedy: Remedy) -> None:
         """Search a remedy for the settings that settle soonest, unless all allowed work is used up."""
@@ -522,7 +522,8 @@ class _Session:
         search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
         # replaced when the search ends
         self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))
-        self.searching = self.searches[remedy.name] = search
+        self.searches.append(search)
+        self.searching = search
         return search
 
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
