@@ -209,7 +209,7 @@ def test_where_there_is_no_design_it_is_said_whether_an_isolator_is_needed(
 
 
 def test_edges_are_those_that_check_finds(base: Stage) -> None:
-    """Two machines without isolator, against the margin of `friso check`."""
+    """Two machines without isolator, against the margin of `friso check`; the lower edge to half a step."""
     static, coulomb = np.array([3.0, 2.0]), np.array([1.0, 0.8])
     several = Population({"friction.static": static, "friction.coulomb": coulomb}, 2)
     edges = edges_over(rigid(base.flat()), several, 2.0, 40.0, 10)
@@ -218,7 +218,9 @@ def test_edges_are_those_that_check_finds(base: Stage) -> None:
         stage = whole.with_numbers({**several.of(k), "controller.crossover": 5.0})
         edge = find_margin(stage, attracting=True)
         assert edge is not None
-        assert edges.edges[k] == pytest.approx(edge.crossover, rel=0.02)
+        assert edges.edges[k] == pytest.approx(
+            edge.crossover, rel=0.02 if k == edges.worst else (40 / 2) ** (1 / 18) - 1
+        )
     assert edges.highest == edges.edges.max()
 
 

@@ -124,9 +124,8 @@ def moves_step(design: Design) -> DesignStep:
     free, locked = design.verification.free, design.verification.locked
     sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
     other = settling(locked)
-    sentences.append(
-        f"{settling(free)}. Of {locked.tried} with the joint locked {restless(locked)}; {other[0].lower()}{other[1:]}."
-    )
+    held = restless(locked, among=True)
+    sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {held}.")
     broken = len(free.completed) - free.tried
     if broken:
         sentences.append(f"{broken} moves could not be simulated to the end and do not count.")

@@ -149,7 +149,7 @@ def leaf_words(geometry: Geometry) -> str:
 def _verified(design: Design) -> tuple[str, str]:
     """Say how many simulated moves come to rest; return the text and the colour of the verdict."""
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
-    held = f" With the joint locked, of {locked.tried} {restless(locked)}." if locked.missed else ""
+    held = f" With the joint locked, {restless(locked, among=True)}." if locked.missed else ""
     if design.needed and not locked.missed:
         held = (
             f" With the joint locked, {locked.tried} do as well: it does not hunt in this sample, but lies closer to "
@@ -163,13 +163,14 @@ def _verified(design: Design) -> tuple[str, str]:
     return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))}).{held}"
 
 
-def restless(outcome: MachineOutcomes) -> str:
-    """Say how many moves do not come to rest in position, and how many swing."""
+def restless(outcome: MachineOutcomes, among: bool = False) -> str:
+    """Say how many moves do not come to rest in position, and how many swing; `among` says of how many."""
     if not outcome.missed:
-        return "all come to rest in position"
+        return f"all{f' {outcome.tried}' if among else ''} come to rest in position"
     count, swinging = outcome.missed, outcome.swinging
     outcomes = f"{swinging} swing, {count - swinging} creep"
-    return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({outcomes})"
+    many = f"{count} of {outcome.tried}" if among else f"{count}"
+    return f"{many} {'does' if count == 1 else 'do'} not come to rest in position ({outcomes})"
 
 
 def probability(outcome: MachineOutcomes) -> str:
