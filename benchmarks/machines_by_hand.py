@@ -40,8 +40,8 @@ the force limit in which a clamped integrator comes to rest, as a fraction of th
 RTOL, LARGEST_STEP = 1e-7, 1e-2
 """Relative tolerance, and largest step [s]."""
 
-MOST_STEPS = 50_000_000
-"""Steps after which a run has failed."""
+MOST_STEPS = 1_000_000
+"""Steps after which a part of a run has failed: elements that stick and slip in turn at no velocity never end."""
 
 FRICTION = ("static", "coulomb", "stribeck_velocity", "stribeck_exponent", "bristle_stiffness", "bristle_damping")
 
