@@ -80,15 +80,15 @@ ROTARY: dict[str, Any] = {
 def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
     """Tune a machine, try working settings on fresh machines, and append lines to the file."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    if not any(row["machine"] == name and "told" in row for row in rows):
+    if not any(row["machine"] == name and {"told", "none_works"} & row.keys() for row in rows):
         begun = process_time()
         advice = tune(stage, goal)
         seconds = process_time() - begun
         with file.open("a") as written:
             for outcome in advice.outcomes:
-                if outcome.certainty not in ("works", "large moves") or outcome.remedy.makes:
+                unknown = outcome.certainty not in ("works", "large moves", "unsure") or outcome.measured is None
+                if unknown or outcome.remedy.makes or outcome.stage is None:
                     continue
-                assert outcome.stage is not None
                 assert outcome.measured is not None
                 share = outcome.measured.share(advice.goal)
                 fleet = draw_fleet(outcome.stage, Correlations(), MOST, FRESH_SEED, advice.goal.moves)
@@ -110,7 +110,7 @@ def tried(name: str, stage: Stage, goal: Goal, count: int, file: Path) -> None:
                 print(name, outcome.remedy.name, row["told"], row["slowest"], f"{seconds:.0f} s", flush=True)
                 written.write(json.dumps(row, default=float) + "\n")
             if not any(outcome.certainty == "works" for outcome in advice.outcomes):
-                written.write(json.dumps({"machine": name, "told": None, "seconds": seconds}) + "\n")
+                written.write(json.dumps({"machine": name, "none_works": True, "seconds": seconds}) + "\n")
     rows = [json.loads(line) for line in file.read_text().splitlines()]
     done = {(row["setting"], row["number"]) for row in rows if row["machine"] == name and "number" in row}
     for row in (row for row in rows if row["machine"] == name and row.get("told")):
@@ -141,9 +141,10 @@ def table(file: Path) -> None:
         for low, high in pairwise(SIZES):
             some = (sizes >= max(low, row["moves_from"] or 0.0)) & (sizes < high)
             by_size.append(f"{settled[some].sum()} of {some.sum()}")
-        in_time = f"{np.count_nonzero(times <= row['slowest'][2])} of {len(runs)}"
+        in_time = f"{np.count_nonzero(settled & (times <= row['slowest'][2]))} of {len(runs)}"
         shares = "{:.1%} ({:.1%} to {:.1%})".format(*row["told"])
         slowest = "{:.3g} s ({:.3g} to {:.3g} s)".format(*row["slowest"])
+        slowest = slowest if np.isfinite(row["slowest"][2]) else slowest.replace("inf s", "never")
         parts = (row["machine"], row["setting"], row["certainty"], shares, f"{settled.sum()} of {len(runs)}", *by_size)
         listed.append((*parts, slowest, in_time, f"{row['seconds']:.0f} s"))
     edges = ["up to 0.1 mm", "to 1 mm", "larger"]

@@ -3,7 +3,8 @@
 Only the reading of the stage file is shared with friso. Sources: thesis, Fig. 3 and 4 and Eq. 3 to 8 (masses, joint,
 LuGre, PID); generalised Maxwell-slip: doi:10.1109/TAC.2005.858676; observer of disturbance rejection:
 doi:10.1007/s11768-023-00129-y; cascade, filters and transmission: docs/controllers.md and docs/drives.md. The
-integrator is the Rosenbrock method of `benchmarks.oracles.plain_runs`. Only elements that stick or slip need events: a
+integrator is the Rosenbrock method of `benchmarks.oracles.plain_runs`, whose equations have no reference that moves, no
+cascade, no second encoder and no elements. Only elements that stick or slip need events: a
 step across a change is halved until it hardly passes the change.
 """
 
@@ -19,8 +20,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from benchmarks.oracles.plain_runs import _factored as factored
-from benchmarks.oracles.plain_runs import _solved as solved
+from benchmarks.oracles.plain_runs import factored, solved
 
 STATES = (
     *("y", "v", "cart", "cart_v", "part", "part_v", "motor", "motor_v", "motor_z", "z1", "z2", "z3", "z4"),
@@ -33,15 +33,30 @@ An observer keeps its estimates of the error, the disturbance and the rate of th
 
 Y, V, YC, VC, YP, VP, YM, VM, ZM, Z1, Z2, Z3, Z4, LOW, INTEGRAL, THIRD, NOTCH, NOTCH_RATE, PASSED = range(len(STATES))
 
-SLIPPING, REST_BAND = 1e-6, 1e-3
-"""How far an element may be pulled beyond its limit before it slips, as a fraction of the limit; and the band beyond
-the force limit in which a clamped integrator comes to rest, as a fraction of the force limit."""
+PASSED_BY, FINEST_STEP = 1e-6, 1e-9
+"""How far a step may pass the change of an element, as a fraction of its limit or of the Stribeck velocity; and the
+step [s] that may pass it farther."""
+
+REST_BAND = 1e-3
+"""Band beyond the force limit in which a clamped integrator comes to rest, as a fraction of the force limit."""
+
+WRITTEN = (
+    *("masses.", "friction.", "motor_friction.", "joint.", "parasitic.", "bias.", "motion.", "transmission.", "drive."),
+    *("axis.", "encoder.", "controller.kind", "controller.crossover", "controller.alpha", "controller.beta"),
+    *("controller.tuned_mass", "controller.kp", "controller.ki", "controller.kd", "controller.tau", "controller.kv"),
+    *("controller.derivative_on", "controller.force_limit", "controller.anti_windup", "controller.bandwidth"),
+    *("controller.observer_ratio", "controller.velocity_", "controller.acceleration_feedforward"),
+    *("controller.coulomb_feedforward", "controller.viscous_feedforward", "controller.proportional_on"),
+    *("controller.filters.1.", "controller.filters.2."),
+)
+"""Beginnings of the keys that the equations contain, or whose values they assert."""
 
 RTOL, LARGEST_STEP = 1e-7, 1e-2
 """Relative tolerance, and largest step [s]."""
 
 MOST_STEPS = 1_000_000
-"""Steps after which a part of a run has failed: elements that stick and slip in turn at no velocity never end."""
+"""Steps after which a part of a run counts as failed. Elements that stick and slip in turn at zero velocity take more.
+"""
 
 FRICTION = ("static", "coulomb", "stribeck_velocity", "stribeck_exponent", "bristle_stiffness", "bristle_damping")
 
@@ -85,22 +100,24 @@ class Machine:
         corners = [0.0, n.ramp, 2 * n.ramp, n.back, n.back + n.ramp, n.back + 2 * n.ramp, duration]
         for number, (low, high) in enumerate(pairwise(corners)):
             target = far if number < 3 else 0.0
-            last, state, done = _followed(
+            since, state, done = _followed(
                 low, high, number, target, within, state, slips, self.scales, self.live, n, RTOL
             )
             if not done:
                 return np.nan
             if number in (2, 5):
-                if last >= high:
-                    return np.inf
-                longest = max(longest, last - low)
+                longest = max(longest, since - low)
         return longest
 
 
 def machine(flat: Mapping[str, Any]) -> Machine:
     """Return the machine given by flat keys to SI numbers."""
     laws, kinds = ("lugre", "gms"), ("pid", "cascade", "adrc")
+    assert not [key for key in flat if not key.startswith(WRITTEN)]
+    assert not [key for key in ("asymmetry", "viscous_asymmetry") if flat.get(f"friction.{key}")]
     assert flat["friction.model"] in laws
+    assert flat.get("motor_friction.model", "lugre") == "lugre"
+    assert ("transmission.mass" in flat) == ("motor_friction.model" in flat)
     assert flat["controller.kind"] in kinds
     assert flat["motion.kind"] == "there_and_back"
     get = flat.get
@@ -177,7 +194,9 @@ def _controller(flat: Mapping[str, Any]) -> dict[str, float]:
     """Return the numbers of the controller, 0 where it has none of a kind."""
     get = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
     kind, limit = get["kind"], get.get("force_limit", np.inf)
-    assert limit == np.inf or get["anti_windup"] == "clamp"
+    assert limit == np.inf or (get["anti_windup"] == "clamp" and kind != "adrc")
+    assert kind == "cascade" or not [key for key in get if key.startswith(("filters", "acceleration", "velocity"))]
+    assert "transmission.mass" not in flat or get["tau"] == 0
     zero = ("kp", "ki", "kd", "tau", "on_error", "observer", "feedback", "believed", "kv", "per_time", "v_forward")
     numbers = dict.fromkeys((*zero, "a_forward", "notch", "width", "depth", "pole"), 0.0) | {"limit": limit}
     if kind == "adrc":
@@ -235,7 +254,7 @@ def _rates(t, number, x, slips, n):  # type: ignore[no-untyped-def]
     place = x[YM] if n.place_at_motor > 0 else x[Y]
     pace = x[VM] if n.pace_at_motor > 0 else x[V]
     e = r - place
-    winding, winds = e, INTEGRAL
+    winding = e
     if n.kind == 0:
         out[LOW] = (e - x[LOW]) / n.tau
         demand = n.kp * x[LOW] + n.ki * x[INTEGRAL] + n.kd * out[LOW]
@@ -260,9 +279,9 @@ def _rates(t, number, x, slips, n):  # type: ignore[no-untyped-def]
         out[THIRD] = x[INTEGRAL] - demand / n.believed + 3 * n.observer**2 * miss
         out[INTEGRAL] = n.observer**3 * miss
     if n.kind < 3:
-        beyond, out[winds] = abs(demand) - n.limit, winding
+        beyond, out[INTEGRAL] = abs(demand) - n.limit, winding
         if beyond > 0 and winding * demand > 0:
-            out[winds] *= max(0.0, 1 - beyond / (REST_BAND * n.limit))
+            out[INTEGRAL] *= max(0.0, 1 - beyond / (REST_BAND * n.limit))
     force = min(max(demand, -n.limit), n.limit)
 
     v = x[VC] if n.joined > 0 else x[V]
@@ -335,10 +354,10 @@ def _passes(before, after, slips, n):  # type: ignore[no-untyped-def]
     for k, (stiff, share) in enumerate(((n.k1, n.a1), (n.k2, n.a2), (n.k3, n.a3), (n.k4, n.a4))):
         if slips[k] > 0:
             if before[row] * v < 0:
-                worst = max(worst, min(abs(v), abs(before[row])) / (1e-6 * n.v_s))
+                worst = max(worst, min(abs(v), abs(before[row])) / (PASSED_BY * n.v_s))
         elif v * after[Z1 + k] > 0:
             limit = share * level
-            worst = max(worst, (stiff * abs(after[Z1 + k]) - limit) / (SLIPPING * limit))
+            worst = max(worst, (stiff * abs(after[Z1 + k]) - limit) / (PASSED_BY * limit))
     return worst
 
 
@@ -357,12 +376,15 @@ def _changed(before, after, slips, n):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _followed(start, end, number, target, within, x, slips, scales, live, n, rtol):  # type: ignore[no-untyped-def]
-    """Run one part of the motion; return the time of the last step out of the band, the state, and if it was run."""
-    t, h, last = start, 1e-7, start
+    """Run one part of the motion; return from when on it is in the band, the state, and whether it was run.
+
+    The time is that of the first step inside, infinite for a stage out of the band at the end.
+    """
+    t, h, since = start, 1e-7, start if abs(x[Y] - target) <= within else np.inf
     base = _rates(t, number, x, slips, n)[live]
     for _ in range(MOST_STEPS):
         if t >= end:
-            return last, x, True
+            return since, x, True
         h = min(h, end - t, LARGEST_STEP)
         if not h > 1e-15:
             break
@@ -388,18 +410,20 @@ def _followed(start, end, number, target, within, x, slips, scales, live, n, rto
                 size = max(size, abs(error[row]) / (rtol * max(scales[k], abs(x[k]), abs(moved[k]))))
             if not size <= 1.0:  # NaN counts as too large
                 h *= max(0.2, 0.9 * size ** (-1 / 3)) if size < np.inf else 0.2
-            elif n.gms > 0 and h > 1e-9 and _passes(x, moved, slips, n) > 1.0:
+            elif n.gms > 0 and h > FINEST_STEP and _passes(x, moved, slips, n) > 1.0:
                 h /= 2
             else:
                 break
             if not h > 1e-15:
-                return last, x, False
+                return since, x, False
         t += h
         if n.gms > 0:
             _changed(x, moved, slips, n)
         x = moved
         if abs(x[Y] - target) > within:
-            last = t
+            since = np.inf
+        elif since == np.inf:
+            since = t
         h *= min(4.0, 0.9 * size ** (-1 / 4)) if size > 0 else 4.0
         base = _rates(t, number, x, slips, n)[live]
-    return last, x, False
+    return since, x, False

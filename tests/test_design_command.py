@@ -355,7 +355,7 @@ def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapsh
     locked = replace(designed.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
     other = replace(designed, verification=replace(designed.verification, locked=locked))
     text = " ".join(moves_step(other).sentences)
-    assert [fact for fact in ("3.00 s", "95 %", "20 of 64 do not") if fact not in text] == []
+    assert [fact for fact in ("3.00 s", "95 %", "Of 64", "20 do not") if fact not in text] == []
     wording(headline(other)[-1][1])
     snapshots.check("design", "moves of a locked joint", "\n".join([text, headline(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))

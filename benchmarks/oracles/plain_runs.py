@@ -211,7 +211,7 @@ def _slopes(y, base, n, second, scales, live):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _factored(a):  # type: ignore[no-untyped-def]
+def factored(a):  # type: ignore[no-untyped-def]
     """Factor a matrix in place (LU); return the order of rows."""
     size = len(a)
     order = np.arange(size)
@@ -233,7 +233,8 @@ def _factored(a):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _solved(lu, order, b):  # type: ignore[no-untyped-def]
+def solved(lu, order, b):  # type: ignore[no-untyped-def]
+    """Solve a system whose matrix was factored, with its order of rows, for the right-hand side b."""
     size = len(b)
     x = np.empty(size)
     for i in range(size):
@@ -252,15 +253,15 @@ def _solved(lu, order, b):  # type: ignore[no-untyped-def]
 def _step(y, h, base, slopes, n, second, live):  # type: ignore[no-untyped-def]
     """Return the state after a step of h, and its estimated error, for the moving states."""
     lu = np.eye(len(live)) * (2.0 / h) - slopes
-    order = _factored(lu)
+    order = factored(lu)
     moved = y.copy()
-    g1 = _solved(lu, order, base)
+    g1 = solved(lu, order, base)
     moved[live] = y[live] + 2.0 * g1
-    g2 = _solved(lu, order, _all_rates(moved, n, second)[live] - 8.0 / h * g1)
+    g2 = solved(lu, order, _all_rates(moved, n, second)[live] - 8.0 / h * g1)
     moved[live] = y[live] + 48 / 25 * g1 + 6 / 25 * g2
     third = _all_rates(moved, n, second)[live]
-    g3 = _solved(lu, order, third + (372 / 25 * g1 + 12 / 5 * g2) / h)
-    g4 = _solved(lu, order, third - (112 / 125 * g1 + 54 / 125 * g2 + 2 / 5 * g3) / h)
+    g3 = solved(lu, order, third + (372 / 25 * g1 + 12 / 5 * g2) / h)
+    g4 = solved(lu, order, third - (112 / 125 * g1 + 54 / 125 * g2 + 2 / 5 * g3) / h)
     moved[live] = y[live] + 19 / 9 * g1 + g2 / 2 + 25 / 108 * g3 + 125 / 108 * g4
     return moved, 17 / 54 * g1 + 7 / 36 * g2 + 125 / 108 * g4
 

@@ -15,7 +15,7 @@ import numpy as np
 from friso.design_method.population import Population
 from friso.design_method.settings import DesignSettings
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.hunting import find_attractors, sketch_attractors
+from friso.hunting import find_attractors
 from friso.progress import Progress, silent
 
 
@@ -24,7 +24,7 @@ class Corners:
     """Extremes of friction and masses (corners), and the edge of hunting at each.
 
     `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts: to 1 or 2 % in the worst corner, in the
-    others to half a step of the search, by coarse return maps. It is 0 if the stage does not hunt from `searched[0]`
+    others to half a step of the search. It is 0 if the stage does not hunt from `searched[0]`
     on, and infinite if it still hunts at `searched[1]`. `unknown` counts the corners whose edge is not certain. Either
     simulations below it failed or did not settle, which counts as hunting. Or something above it may attract that no
     simulation reached.
@@ -65,24 +65,23 @@ def edges_over(
 ) -> Corners:
     """Find the edge of hunting of a stage by van Dijk's rules, for each machine of a population.
 
-    The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts. Once one machine does,
-    coarse return maps are enough for the others. Then the step above that point is halved, for the machines that may
-    have the highest edge of all. `label` names the search to the progress.
+    The search goes down from `high` to `low` [Hz] on a grid of `steps`, until the stage hunts. It then halves the step
+    above that point, for the machines that may have the highest edge of all. `label` names the search to the progress.
     """
     settings = DesignSettings.current()
     corners = population.over({**flat, CROSSOVER: np.nan, "motion.kind": "release"})  # whatever the stage's motion
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
     inside, outside, unsure = np.full(count, -np.inf), np.full(count, np.inf), np.zeros((2, count), bool)
 
-    def survey(which: np.ndarray, crossover: np.ndarray, coarsely: bool = False) -> None:
-        attract, certain = _attract(corners, which, crossover, coarsely)
+    def survey(which: np.ndarray, crossover: np.ndarray) -> None:
+        attract, certain = _attract(corners, which, crossover)
         outside[which[~attract]], inside[which[attract]] = crossover[~attract], crossover[attract]
         unsure[attract.astype(int), which] = ~certain
 
     for k, point in enumerate(grid[::-1]):
         progress(k, steps + settings.edge_bisections, label)
         if (left := np.flatnonzero(np.isneginf(inside))).size:
-            survey(left, np.full(left.size, point), coarsely=left.size < count)
+            survey(left, np.full(left.size, point))
     for k in range(settings.edge_bisections):
         progress(steps + k, steps + settings.edge_bisections, label)
         highest = np.flatnonzero(np.isfinite(inside) & np.isfinite(outside) & (outside > inside.max()))
@@ -120,20 +119,14 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _attract(
-    corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray, coarsely: bool
-) -> tuple[np.ndarray, np.ndarray]:
+def _attract(corners: Mapping[str, Any], which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell which corners hunt or may hunt at certain crossovers, and whether that is certain.
 
-    `which` are indices of corners, and `crossover` the logarithm of a crossover for each. Coarse return maps may be
-    enough (`coarsely`).
+    `which` are indices of corners, and `crossover` the logarithm of a crossover for each.
     """
+    settings = DesignSettings.current()
     some = {key: value[which] if np.ndim(value) else value for key, value in corners.items()}
-    flat = {**some, CROSSOVER: np.exp(crossover)}
-    if coarsely:
-        attracted = sketch_attractors(flat, len(which))
-    else:
-        attracted = find_attractors(flat, len(which), DesignSettings.current().orbit_rtol)
+    attracted = find_attractors({**some, CROSSOVER: np.exp(crossover)}, len(which), settings.orbit_rtol)
     return attracted.attracts | ~attracted.decided, attracted.certain
 
 

@@ -158,8 +158,8 @@ class DesignSettings(Settings):
     """Number of verified moves, which shows 95 % to half a percent."""
 
     compared_moves: int = setting(1000, "")
-    """Number of these moves that are also made with the joint locked, which shows a fraction to 3 %. Most of them swing
-    and are followed for longer, so each takes as long as ten others."""
+    """Number of these moves that are also made with the joint locked, which shows a fraction to three percent of all.
+    Where the joint is needed many of them swing, and are followed ten times as long."""
 
     followed_time: float = setting(15.0, "s")
     """Time for which a move is followed, as in the thesis's path."""

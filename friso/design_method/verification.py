@@ -49,6 +49,10 @@ class MachineOutcomes:
     settling: np.ndarray
     swing: np.ndarray
 
+    def first(self, count: int) -> MachineOutcomes:
+        """Return the outcomes of the first machines, `count` of them."""
+        return MachineOutcomes(self.words[:count], self.settling[:count], self.swing[:count])
+
     @property
     def completed(self) -> np.ndarray:
         """Tell which runs were simulated to their end, shape (count,)."""
@@ -108,13 +112,18 @@ class MachineOutcomes:
 class Verification:
     """The machines and moves drawn, with their outcomes for the joint `free` and, of the first ones, `locked`.
 
-    `worst` is the worst machine with a free joint, as a stage.
+    `compared` has the outcomes with a free joint of those that were also moved with a locked one. `worst` is the worst
+    machine with a free joint, as a stage.
     """
 
     population: Population
     free: MachineOutcomes
     locked: MachineOutcomes
     worst: Stage
+
+    @property
+    def compared(self) -> MachineOutcomes:
+        return self.free.first(len(self.locked.words))
 
 
 def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:

@@ -94,8 +94,8 @@ def _edge(draws: Draws) -> str:
         return ""
     span = range_with_unit(float(np.nanmin(drawn_edges.low)), float(np.nanmax(drawn_edges.high)), "Hz")
     beyond = int(np.isnan(drawn_edges.low).sum())
-    out = f" ({beyond} of {len(drawn_edges.low)} have it farther away or nowhere)" if beyond else ""
-    return f"; the edge of hunting at {span}{out}"
+    out = f" ({beyond} of {len(drawn_edges.low)} have it farther away, nowhere or not for certain)" if beyond else ""
+    return f"; the edge of hunting roughly at {span}{out}"
 
 
 def _narrowed(draws: Draws) -> str:

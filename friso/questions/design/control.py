@@ -124,8 +124,8 @@ def moves_step(design: Design) -> DesignStep:
     free, locked = design.verification.free, design.verification.locked
     sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
     other = settling(locked)
-    held = restless(locked, among=True)
-    sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {held}.")
+    held = f"{other[0].lower()}{other[1:]}, and {restless(locked)}"
+    sentences.append(f"{settling(free)}. Of {locked.tried} with the joint locked: {held}.")
     broken = len(free.completed) - free.tried
     if broken:
         sentences.append(f"{broken} moves could not be simulated to the end and do not count.")

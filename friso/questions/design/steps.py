@@ -132,5 +132,6 @@ def _gap(design: Design) -> list[str]:
     if not hunting.size:
         return [f"{text} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
     top = hunting.max()
-    reach = f"up to about {hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
+    about = "" if top == design.without.highest else "about "
+    reach = f"up to {about}{hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
     return [f"{text} According to the thesis hunting needs about {GAP:g} N; here corners with less also hunt, {reach}."]

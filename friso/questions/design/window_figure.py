@@ -52,7 +52,7 @@ def window_figure(design: Design) -> Figure:
         f"What bounds the crossover, and the chosen one, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
         f"{WANTED:g}. Isolator, without: where the machine hunts with and without it; dots mark the edges in the "
-        "corners of friction and masses, found coarsely but for the highest."
+        "corners of friction and masses; all but the highest are approximate."
     )
     return Figure("design_window", "The window for the crossover", caption, (panel,))
 

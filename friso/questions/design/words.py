@@ -121,14 +121,15 @@ def need_words(need: Need) -> str:
 
 def brings(design: Design) -> str:
     """Say what an isolator brings and costs where none is needed."""
-    moves, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
+    free, locked = design.verification.compared, design.verification.locked
+    crossover, limit = design.controller.crossover, design.spec.limit
     costs = f" This costs bandwidth: a crossover of {hertz(crossover)} instead of {hertz(limit)}."
     slower = costs if crossover < 0.97 * limit else ""
     return (
         f"For comparison, with the isolator the machine {edge(design.edges)}. Moves settle in "
-        f"{seconds(moves.free.slower_than(0.5))} instead of {seconds(moves.locked.slower_than(0.5))} (median), 95 % "
-        f"of them in {seconds(moves.free.slower_than(0.05))} instead of "
-        f"{seconds(moves.locked.slower_than(0.05))}, at the same crossover.{slower}"
+        f"{seconds(free.slower_than(0.5))} instead of {seconds(locked.slower_than(0.5))} (median), 95 % of them in "
+        f"{seconds(free.slower_than(0.05))} instead of {seconds(locked.slower_than(0.05))}, at the same "
+        f"crossover.{slower}"
     )
 
 
@@ -152,8 +153,8 @@ def _verified(design: Design) -> tuple[str, str]:
     held = f" With the joint locked, {restless(locked, among=True)}." if locked.missed else ""
     if design.needed and not locked.missed:
         held = (
-            f" With the joint locked, {locked.tried} do as well: it does not hunt in this sample, but lies closer to "
-            f"the edge of hunting than the safety factor of {design.spec.safety.hunting:g} allows."
+            f" With the joint locked, all {locked.tried} tried do as well: it does not hunt in this sample, but lies "
+            f"closer to the edge of hunting than the safety factor of {design.spec.safety.hunting:g} allows."
         )
     text = f"Of {free.tried} simulated moves {restless(free)}: {probability(free)}. {settling(free)}"
     if limit is None:
@@ -166,7 +167,7 @@ def _verified(design: Design) -> tuple[str, str]:
 def restless(outcome: MachineOutcomes, among: bool = False) -> str:
     """Say how many moves do not come to rest in position, and how many swing; `among` says of how many."""
     if not outcome.missed:
-        return f"all{f' {outcome.tried}' if among else ''} come to rest in position"
+        return "all come to rest in position"
     count, swinging = outcome.missed, outcome.swinging
     outcomes = f"{swinging} swing, {count - swinging} creep"
     many = f"{count} of {outcome.tried}" if among else f"{count}"
