@@ -16,10 +16,12 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.attractors.survey import Swinging
+from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL, described, kept
+from friso.hunting.cycle.shooting import close
 from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
@@ -142,12 +144,16 @@ class EdgeSearch:
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 return self._bracketed(place)
-            end, distance = self.followed(place.at, orbit)
+            end, last = self.followed(place.at, orbit)
+            distance = _orbit_distance(last, orbit)
             place.at = end
             next_to, farther = self._just_beyond(end)
             beyond, survey = self._proved(next_to, farther, ALONG * distance)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
+                if again := self._stable_again(end, next_to, last):
+                    place.at, place.motions, place.outside = next_to, again, self._still_ahead(next_to, place.outside)
+                    continue
                 return AttractionEnd(end, next_to, bool(survey.decided.all()))
             place.at, place.motions = float(beyond[attracts[-1]]), survey.take(attracts[-1:]).motions
             place.outside = self._still_ahead(place.at, place.outside)
@@ -229,6 +235,22 @@ class EdgeSearch:
         begun = np.broadcast_to(distances, (len(factors), len(distances)))
         return what_attracts(self._stages(factors), distances=begun, confirm=confirm)
 
+    def _stable_again(self, end: float, beyond: float, last: Point) -> tuple[Swinging, ...]:
+        """Follow an orbit past its `end` to a factor `beyond`; return it as a motion if it is stable there again.
+
+        `last` is the orbit at its end. After a flip an orbit may repel for a narrow range only, and then attract from a
+        basin narrower than the steps of a return map.
+        """
+        at = last.cycle.orbits
+        for factor in np.geomspace(end, beyond, EdgeSettings.current().past_end_steps + 1)[1:]:
+            stages = self._stages(np.array([factor]))
+            if stages.chatters:
+                return ()
+            before, at = at, close(stages, at.states, at.times, at.sign, RTOL, at.swings)
+            if not (at.closed & kept(stages, at, before.states[:, stages.sticking]))[0]:
+                return ()
+        return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, RTOL), stages.sticking))
+
     def _stages(self, factors: np.ndarray) -> Ensemble:
         """Return the stage with its bandwidth multiplied by factors."""
         return Ensemble.held(faster(self.flat, factors), len(factors))
@@ -243,10 +265,10 @@ class EdgeSearch:
         return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * EdgeSettings.current().reach_log))
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
+    def followed(self, at: float, orbit: Swinging) -> tuple[float, Point]:
         """Follow a closed orbit from a factor to the last factor at which it is stable.
 
-        Returns this factor and the sticking distance [m] there. Raises Beyond if the orbit is stable up to the end of
+        Returns this factor and the orbit there. Raises Beyond if the orbit is stable up to the end of
         the search.
         """
         settings = EdgeSettings.current()
@@ -293,7 +315,7 @@ class EdgeSearch:
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif tracer.reaches(points, reason):
             raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), _orbit_distance(farthest, orbit)
+        return float(at * np.exp(ahead * farthest.place)), farthest
 
 
 def _orbit_distance(point: Point, orbit: Swinging) -> float:

@@ -24,7 +24,7 @@ from friso.hunting import Ensemble, find_cycles
 from friso.interface.output_folder import UNFINISHED, write
 from friso.progress import Tally, silent
 from friso.stage import Stage
-from friso_thesis.questions.guideline.words import parasitic_sentences
+from friso_thesis.questions.guideline.words import parasitic_sentences, sentences
 from friso_thesis.studies.guideline import checks, compute, parasitic, persistence, sweeps, worked
 from friso_thesis.studies.guideline.claims import judged_claims, least_gap
 from friso_thesis.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
@@ -376,16 +376,21 @@ def quick() -> compute.Guideline:
     """Return a guideline of invented sweeps and a shortened rig, to test what is shown."""
     patch = pytest.MonkeyPatch()
     patch.setattr(sweeps, "find_edges", invented)
+    shortened(patch)
+    try:
+        yield compute.guideline(compute.FEWEST)
+    finally:
+        patch.undo()
+
+
+def shortened(patch: pytest.MonkeyPatch) -> None:
+    """Leave out all that takes long after the sweeps."""
     patch.setattr(
         compute, "simulate_samples", lambda sweep, most: checks.SimulationCheck(most, most, 0, most, 0, 100, 0)
     )
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
     patch.setattr(parasitic, "FREQUENCIES", (300.0,))
-    try:
-        yield compute.guideline(compute.FEWEST)
-    finally:
-        patch.undo()
 
 
 def invented(stages: Any, grid: np.ndarray) -> Edges:
@@ -481,16 +486,44 @@ def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(KeyboardInterrupt):
         sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
     assert keep.count == 1
-    resumed = sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
+    resumed = sweeps.locked_sweep(96, 1, sweeps.Keep(keep.folder), Tally(silent, 96))
     assert calls == [32] * 4
     whole = sweeps.locked_sweep(96, 1, sweeps.Keep(), Tally(silent, 96))
     assert np.array_equal(resumed.edge, whole.edge, equal_nan=True)
     with monkeypatch.context() as patch:  # what other equations made is not taken over
         patch.setattr("friso_thesis.studies.kept_work.equations_version", lambda: "others")
-        sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
+        sweeps.locked_sweep(96, 1, sweeps.Keep(keep.folder), Tally(silent, 96))
     assert (len(calls), keep.count) == (10, 6)
     keep.clear()
     assert keep.count == 0
+
+
+@pytest.mark.parametrize("after", [0, 9, 40])
+def test_an_interrupted_guideline_answers_from_fewer_samples(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+    """Sweeps grow in rounds; the last whole round counts, and a larger sweep takes the parts of smaller ones over."""
+    calls: list[int] = []
+
+    def stopping(stages: Any, grid: np.ndarray) -> Edges:
+        if len(calls) == after:
+            raise KeyboardInterrupt
+        calls.append(len(grid))
+        return invented(stages, grid)
+
+    monkeypatch.setattr(sweeps, "find_edges", stopping)
+    shortened(monkeypatch)
+    if after == 0:
+        with pytest.raises(KeyboardInterrupt):
+            compute.guideline(512)
+        return
+    answer = compute.guideline(512)
+    whole = after == 40
+    assert answer.interrupted is not whole
+    assert answer.samples == (512 if whole else 64)
+    assert len(calls) <= after
+    again = 2 * sweeps.PART  # parts with a free joint that later rounds fill up
+    assert sum(calls) <= 512 + 128 + 2 * (192 + 96) + again
+    assert answer.locked.on_test.count > 0
+    assert ("Interrupted" in " ".join(sentences(answer))) is answer.interrupted
 
 
 @pytest.mark.parametrize("samples", ["0", "-3", "63", "100000"])

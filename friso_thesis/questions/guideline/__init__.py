@@ -9,5 +9,6 @@ QUESTION = Question(
     "guideline --out guideline\nA quick try: friso guideline --samples 64 --out guideline",
     takes=(),
     folder="guideline",
+    answers_interrupted=True,
     runner="friso_thesis.commands.guideline",
 )

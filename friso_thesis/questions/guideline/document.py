@@ -25,6 +25,7 @@ def guideline_document(guideline: Guideline) -> dict[str, Any]:
             "conclusion": accuracy(guideline)[0],
             "friso": VERSION,
             "samples": guideline.samples,
+            "interrupted": guideline.interrupted,
             "seconds_s": guideline.seconds,
             "cores": guideline.cores,
             "parts_resumed": guideline.resumed,

@@ -12,6 +12,11 @@ from friso_thesis.studies.guideline.compute import SAMPLES
 class GuidelineAnswer(Answer):
     """The guideline: `result` is a `Guideline` with both laws and their errors."""
 
+    @property
+    def interrupted(self) -> bool:
+        """Tell whether Ctrl-C ended the sweeps, so that it rests on fewer samples."""
+        return bool(self.result.interrupted)
+
 
 @question
 def guideline(samples: int = SAMPLES, *, folder: Path | None = None, progress: Progress = silent) -> GuidelineAnswer:

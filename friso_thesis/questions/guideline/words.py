@@ -136,5 +136,9 @@ def _spread(values: Sequence[float]) -> str:
 
 
 def sentences(guideline: Guideline) -> list[str]:
-    """Say how accurately both laws predict the edge of hunting of held-out stages."""
-    return accuracy(guideline)
+    """Say how accurately both laws predict the edge of hunting of held-out stages.
+
+    Of an interrupted guideline it is said first on how many samples it rests.
+    """
+    so_far = f"Interrupted: the answer so far, from {guideline.samples} samples of the locked law."
+    return [*([so_far] if guideline.interrupted else []), *accuracy(guideline)]

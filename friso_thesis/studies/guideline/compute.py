@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ from friso_thesis.studies.guideline.sweeps import (
     LOCKED,
     LOCKED_FIT,
     LOCKED_TEST,
+    PART,
     STEPS,
     Keep,
     Sweep,
@@ -54,6 +56,9 @@ work."""
 
 CHECKED = 1 / 8
 """Ratio of simulated samples to samples of the locked fit."""
+
+ROUNDS = (1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Fractions of the samples that are swept in turn, so that an interrupted run has an answer from fewer samples."""
 
 RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
 """Edges of the bins of the ratio of slip to drop, for errors of the locked law."""
@@ -104,7 +109,7 @@ class Guideline:
 
     Fields are the numbers of dimensionless groups by part of the stage, both laws, the worked steps, and what a
     parasitic mode allows. Also stored are how long the computation took [s], on how many cores, and how many parts of
-    the sweeps came from an interrupted run.
+    the sweeps came from an interrupted run. An `interrupted` guideline rests on fewer samples than were asked for.
     """
 
     samples: int
@@ -116,6 +121,7 @@ class Guideline:
     seconds: float
     cores: int
     resumed: int
+    interrupted: bool = False
 
     def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
         """Return the errors of a law on the held-out samples selected by `which`, shape (count,).
@@ -181,7 +187,8 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     """Compute the guideline.
 
     `keep` is a folder for finished parts, from which an interrupted run goes on. `progress` is called as work is done.
-    Raises InputError for an unusable number of samples.
+    After Ctrl-C, the guideline is computed from the samples so far. Raises KeyboardInterrupt if these are too few, and
+    InputError for an unusable number of samples.
     """
     checked_samples(samples)
     begin = time.perf_counter()
@@ -192,20 +199,55 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     tally.add(0, "compiling")
     _compile()
 
-    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, tally)
-    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, tally)
-    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, tally)
-    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally)
+    swept: _Swept | None = None
+    interrupted = False
+    try:
+        for share in ROUNDS:
+            some = {name: min(size, PART * ceil(share * size / PART)) for name, size in sizes.items()}
+            if share == 1 or some["locked fit"] >= FEWEST:
+                swept = _Swept.of(some, parts, tally, last=share == 1)
+    except KeyboardInterrupt:
+        if swept is None:
+            raise
+        interrupted = True
+    assert swept is not None  # by the last round
+    samples = len(swept.rigid.edge)
     tally.add(0, "laws and simulations")
     few = max(8, int(samples * CHECKED))
-    locked_fit = _locked_fit(rigid, concatenate_sweeps(rigid_test, beside, beside_test), few)
-    free_fit = _free(free, free_test, locked_fit.law, few)
+    locked_fit = _locked_fit(swept.rigid, concatenate_sweeps(swept.rigid_test, *swept.beside), few)
+    free_fit = _free(swept.free, swept.free_test, locked_fit.law, few)
     tally.add(0, "worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(thesis_rig())
     seconds, cores = time.perf_counter() - begin, usable_cores()
-    return Guideline(samples, group_counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
+    return Guideline(samples, group_counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed, interrupted)
+
+
+@dataclass(frozen=True)
+class _Swept:
+    """Sweeps for a guideline: of rigid masses, of free joints, and of rigid masses `beside` these.
+
+    Each has samples for a fit and for its test.
+    """
+
+    rigid: Sweep
+    rigid_test: Sweep
+    free: Sweep
+    free_test: Sweep
+    beside: tuple[Sweep, Sweep]
+
+    @classmethod
+    def of(cls, sizes: Mapping[str, int], parts: Keep, tally: Tally, last: bool) -> _Swept:
+        """Sweep samples, `sizes` by name; parts that are done already are taken over.
+
+        Unless these are the `last` sweeps, larger ones follow.
+        """
+        rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, tally)
+        rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, tally)
+        free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, tally, last)
+        free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally, last)
+        return cls(rigid, rigid_test, free, free_test, (beside, beside_test))
 
 
 def checked_samples(samples: int) -> None:

@@ -6,7 +6,7 @@ The sweeps are computed in parts, which are kept if a run is interrupted.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from scipy.stats import qmc
@@ -96,15 +96,20 @@ def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
     )
 
 
+@dataclass(frozen=True)
 class Keep(KeptWork):
-    """Folder in which finished parts of sweeps are saved until all are done."""
+    """Folder in which finished parts of sweeps are saved until all are done; `parts` has them by name."""
+
+    parts: dict[str, Edges] = field(default_factory=dict)
 
     sources = ("../friso_thesis/studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
-        """Return the part of a sweep with this name from the folder; otherwise `make` and save it."""
-        columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
-        return Edges(**columns)
+        """Return the part of a sweep with this name; otherwise `make` and save it."""
+        if name not in self.parts:
+            columns = self.arrays((name,), lambda: _columns(make()), [column.name for column in fields(Edges)])
+            self.parts[name] = Edges(**columns)
+        return self.parts[name]
 
 
 def _columns(edges: Edges) -> dict[str, np.ndarray]:
@@ -125,24 +130,26 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
     """
     values = sobol_samples(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
-    edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
+    edges = _in_parts(f"locked {seed}", values, grid, keep, tally, LOCKED)
     return Sweep(values, edges.crossover, edges)
 
 
-def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
+def free_sweep(count: int, seed: int, keep: Keep, tally: Tally, last: bool = True) -> tuple[Sweep, Sweep]:
     """Return the edges of samples with a free joint, and of all `count` with locked joints.
 
     The first result has only samples with a locked edge, because the frequency of the joint is chosen relative to it.
+    Unless it is the `last` sweep of these samples, a part that a larger sweep will fill up is left out.
     """
     drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
-    locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, tally, LOCKED)
+    locked = _in_parts(f"locked beside free {seed}", rigid, grid, keep, tally, LOCKED)
     has = np.flatnonzero(locked.located)
+    has = has if last or len(has) < PART else has[: len(has) // PART * PART]
     values = {name: value[has] for name, value in drawn_values.items() if name != "ratio"}
     at = locked.crossover[has]
     values["joint"] = (drawn_values["ratio"][has] * at) ** 2
-    edges = _in_parts(f"free {seed} {count}", values, at[:, None] * FREE_GRID, keep, tally, FREE)
+    edges = _in_parts(f"free {seed}", values, at[:, None] * FREE_GRID, keep, tally, FREE)
     return Sweep(values, at, edges), Sweep(rigid, locked.crossover, locked)
 
 
@@ -151,12 +158,12 @@ def _in_parts(
 ) -> Edges:
     parts = []
     for first in range(0, len(grid), PART):
-        part = slice(first, first + PART)
+        part = slice(first, min(first + PART, len(grid)))
         subset = {group: value[part] for group, value in values.items()}
-        parts.append(
-            keep.part(f"{name} {first}", lambda subset=subset, part=part: find_edges(_stages(subset), grid[part]))
-        )
-        tally.add(STEPS[label] * len(grid[part]), label)
+        title, done = f"{name} {first} {part.stop}", len(keep.parts)
+        parts.append(keep.part(title, lambda subset=subset, part=part: find_edges(_stages(subset), grid[part])))
+        if len(keep.parts) > done:
+            tally.add(STEPS[label] * len(grid[part]), label)
     return concatenate_edges(parts)
 
 
