@@ -54,7 +54,7 @@ WRITTEN = (
 RTOL, LARGEST_STEP = 1e-7, 1e-2
 """Relative tolerance, and largest step [s]."""
 
-MOST_STEPS = 10_000_000
+MOST_STEPS = 50_000_000
 """Steps after which a part of a run counts as failed. Elements that stick and slip in turn at zero velocity take more.
 """
 
