@@ -241,11 +241,11 @@ class EdgeSearch:
         `last` is the orbit at its end. After a flip an orbit may repel for a narrow range only, and then attract from a
         basin narrower than the steps of a return map.
         """
-        at = last.cycle.orbits
+        at, stages = last.cycle.orbits, self._stages(np.array([end]))
+        if stages.chatters:
+            return ()
         for factor in np.geomspace(end, beyond, EdgeSettings.current().past_end_steps + 1)[1:]:
             stages = self._stages(np.array([factor]))
-            if stages.chatters:
-                return ()
             before, at = at, close(stages, at.states, at.times, at.sign, RTOL, at.swings)
             if not (at.closed & kept(stages, at, before.states[:, stages.sticking]))[0]:
                 return ()
