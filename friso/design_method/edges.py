@@ -24,10 +24,9 @@ class Corners:
     """Extremes of friction and masses (corners), and the edge of hunting at each.
 
     `edges` [Hz], shape (n,), is the highest crossover at which the stage hunts: to 1 or 2 % in the worst corner, in the
-    others to half a step of the search. It is 0 if the stage does not hunt from `searched[0]`
-    on, and infinite if it still hunts at `searched[1]`. `unknown` counts the corners whose edge is not certain. Either
-    simulations below it failed or did not settle, which counts as hunting. Or something above it may attract that no
-    simulation reached.
+    others to half a step of the search. It is 0 if the stage does not hunt from `searched[0]` on, and infinite if it
+    still hunts at `searched[1]`. `unknown` counts the corners whose edge is not certain. Either simulations below it
+    failed or did not settle, which counts as hunting. Or something above it may attract that no simulation reached.
     """
 
     population: Population

@@ -241,13 +241,13 @@ class EdgeSearch:
         `last` is the orbit at its end. After a flip an orbit may repel for a narrow range only, and then attract from a
         basin narrower than the steps of a return map.
         """
-        at, stages = last.cycle.orbits, self._stages(np.array([end]))
+        at, stages = last.cycle.orbits, self._stages(np.array([beyond]))
         if stages.chatters:
             return ()
         for factor in np.geomspace(end, beyond, EdgeSettings.current().past_end_steps + 1)[1:]:
-            stages = self._stages(np.array([factor]))
-            before, at = at, close(stages, at.states, at.times, at.sign, RTOL, at.swings)
-            if not (at.closed & kept(stages, at, before.states[:, stages.sticking]))[0]:
+            there = self._stages(np.array([factor]))
+            before, at = at, close(there, at.states, at.times, at.sign, RTOL, at.swings)
+            if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
                 return ()
         return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, RTOL), stages.sticking))
 
@@ -268,8 +268,7 @@ class EdgeSearch:
     def followed(self, at: float, orbit: Swinging) -> tuple[float, Point]:
         """Follow a closed orbit from a factor to the last factor at which it is stable.
 
-        Returns this factor and the orbit there. Raises Beyond if the orbit is stable up to the end of
-        the search.
+        Returns this factor and the orbit there. Raises Beyond if the orbit is stable up to the end of the search.
         """
         settings = EdgeSettings.current()
         ahead, cycles = self._ahead(at), orbit.cycles
