@@ -211,12 +211,12 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
             raise
         interrupted = True
     assert swept is not None  # by the last round
-    samples = len(swept.rigid.edge)
-    tally.add(0, "laws and simulations")
+    samples, so_far = len(swept.rigid.edge), "the answer so far (Ctrl-C again ends it): " if interrupted else ""
+    tally.add(0, f"{so_far}laws and simulations")
     few = max(8, int(samples * CHECKED))
     locked_fit = _locked_fit(swept.rigid, concatenate_sweeps(swept.rigid_test, *swept.beside), few)
     free_fit = _free(swept.free, swept.free_test, locked_fit.law, few)
-    tally.add(0, "worked steps")
+    tally.add(0, f"{so_far}worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(thesis_rig())
