@@ -38,18 +38,22 @@ SKETCH_RTOL = ToleranceSettings().sketch_rtol
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def what_attracts(
-    stages: Ensemble, rtol: float = RTOL, distances: np.ndarray | None = None, confirm: Sequence[int] = ()
+    stages: Ensemble,
+    rtol: float = RTOL,
+    distances: np.ndarray | None = None,
+    confirm: Sequence[int] = (),
+    suggested: tuple[Cycles, ...] = (),
 ) -> Attractors:
     """Find the attractors of stages as closed orbits, from return maps where these suffice.
 
     A map shows that there is no attractor under three conditions: no cycle that Newton's method closes from the map of
     stages at rest is stable; no unstable cycle has a lasting motion beside it; and, for the stages numbered `confirm`,
     runs land where the map predicts. All other stages are searched from many starts, beside these cycles and motions,
-    and from `distances` [m], shape (count, n). Orbits are closed to the relative tolerance `rtol`. Raises Exhausted if
-    an allowance of work is used up.
+    and from `distances` [m], shape (count, n). `suggested` are the stages' `families`, if they are known. Orbits are
+    closed to the relative tolerance `rtol`. Raises Exhausted if an allowance of work is used up.
     """
     if not has_a_map(stages):
-        return _searched(stages, rtol, distances, _Cycles.of(stages, stages.searching_rtol(rtol)))
+        return _searched(stages, rtol, distances, _Cycles.of(stages, stages.searching_rtol(rtol), suggested))
     survey = survey_maps(stages, rtol)
     decided = survey.resolved | survey.attracts  # a stable closed orbit proves attraction
     quiet = np.array([number for number in confirm if decided[number] and not survey.attracts[number]], dtype=np.int64)
@@ -57,7 +61,9 @@ def what_attracts(
         decided[quiet] = runs_land_as_foretold(survey, quiet)
     motions, left = survey.motions, np.flatnonzero(~survey.attracts)
     if left.size:
-        cycles = _Cycles.of(stages.take(left), rtol).beside(survey, left)
+        cycles = _Cycles.of(stages.take(left), rtol, tuple(family.take(left) for family in suggested)).beside(
+            survey, left
+        )
         which = np.flatnonzero(~decided[left] | cycles.attract_or_hold)
         if (open_ := left[which]).size:
             begun = None if distances is None else distances[open_]
@@ -66,6 +72,14 @@ def what_attracts(
             decided[open_] = answer.decided
     nothing = np.zeros(stages.count, bool)
     return Attractors(motions, decided, typical_period(stages), (), nothing, decided, nothing)
+
+
+def attractors_beside(stages: Ensemble, cycles: tuple[Cycles, ...], rtol: float = RTOL) -> Attractors:
+    """Find the attractors of stages whose `families` of cycles are known, by return maps or by simulation.
+
+    Orbits are closed to the relative tolerance `rtol`.
+    """
+    return what_attracts(stages, rtol, suggested=cycles) if has_a_map(stages) else attractors(stages, rtol=rtol)
 
 
 @dataclass(frozen=True)
@@ -79,12 +93,12 @@ class _Cycles(ArrayRows):
     held: np.ndarray
 
     @classmethod
-    def of(cls, stages: Ensemble, rtol: float) -> _Cycles:
-        """Close the cycles of stages, and find lasting motions beside the unstable ones.
+    def of(cls, stages: Ensemble, rtol: float, cycles: tuple[Cycles, ...] = ()) -> _Cycles:
+        """Close the cycles of stages, if they are not known, and find lasting motions beside the unstable ones.
 
         Orbits are closed to the relative tolerance `rtol`.
         """
-        cycles = families(stages, rtol)
+        cycles = cycles or families(stages, rtol)
         return cls(cycles, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def beside(self, survey: MapSurvey, numbers: np.ndarray) -> _Cycles:

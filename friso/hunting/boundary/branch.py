@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, described
-from friso.hunting.cycle.shooting import Border, Family, close_along
+from friso.hunting.cycle.shooting import Border, Condition, Family, Followed, close_along, close_where, moved_by
+from friso.hunting.settings import ToleranceSettings
 
 END_OF_RANGE = "end of the range"
 """Reason for the end of a branch: it reached the end of the range."""
@@ -165,15 +168,19 @@ class Tracer:
         (planes, states), `times` [s] and `places`, (planes,), with `jacobians` of cycles near them if known.
         """
 
-        def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            """Return the stages at `places`, all on the line that is followed."""
-            return self.family(np.zeros(len(places), np.int64), places)
-
         border = Border(np.broadcast_to(normal, targets.shape), targets @ normal)
-        orbits, places, jacobians = close_along(
-            family, states, times, places, border, self.sign, self.rtol, self.swings, jacobians
+        return self._points(
+            close_along(self._on_line, states, times, places, border, self.sign, self.rtol, self.swings, jacobians)
         )
-        stages = self.family(np.zeros(len(places), np.int64), places)
+
+    def _on_line(self, _: np.ndarray, places: np.ndarray) -> Ensemble:
+        """Return the stages at `places`, all on the line that is followed."""
+        return self.family(np.zeros(len(places), np.int64), places)
+
+    def _points(self, followed: Followed) -> list[Point | None]:
+        """Return the cycles of orbits that were followed; None for an orbit that is not closed."""
+        orbits, places, jacobians = followed
+        stages = self._on_line(places, places)
         cycles = described(stages, orbits, self.rtol)
         usable = orbits.closed & np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude)
         certain = np.all(np.isfinite(jacobians), axis=(1, 2))
@@ -183,6 +190,22 @@ class Tracer:
             jacobian = jacobians[one] if certain[k] else None
             points[k] = Point.of(stages.take(one), float(places[k]), cycles.take(one), jacobian)
         return points
+
+    def meet(self, condition: Condition, guess: np.ndarray, states: np.ndarray, near: Point) -> Point | None:
+        """Find the cycle that meets a condition, from a `guess` in the space of place, log distance and log time.
+
+        `states`, shape (1, states), lie near the cycle. The Jacobian of the cycle `near` it, which meets the condition
+        too, is used first, if it is known. Returns None if no cycle is found.
+        """
+        times = near.cycle.orbits.times * np.exp(guess[2] - near.time)
+        begin = replace(near.cycle.orbits, states=states, times=times)
+        return self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians))[0]
+
+    def shift(self, condition: Condition, point: Point) -> float:
+        """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""
+        tight, place = self.rtol * ToleranceSettings.current().check_rtol_factor, np.array([point.place])
+        moved = moved_by(condition, self._on_line, point.cycle.orbits, place, tight, point.jacobians)
+        return abs(float(moved[0]))
 
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
@@ -269,7 +292,7 @@ class Tracer:
 
     def branch(self, start: Point) -> Branch:
         """Follow the branch through the cycle `start`, in both directions."""
-        (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
+        (after, last), (before, first) = side_by_side([partial(self.walk, start, ahead) for ahead in (1.0, -1.0)])
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 
 

@@ -16,7 +16,7 @@ from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import Bifurcation, LocatedPoint, corrected
+from friso.hunting.boundary.locate import ALONG, Bifurcation, LocatedPoint, met
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
@@ -111,21 +111,19 @@ class CurveTracer:
         """
         hundredth = self.space.hundredth(origin, across)
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
-        point, special = near.special.point, near.special
-        size, states, slope = near.size, point.cycle.states, np.nan
+        special, size, states = near.special, near.size, near.special.point.cycle.states
         if expected is not None:
-            size, states, slope = expected.size, expected.states, self._slope(near, across, expected)
-        start = np.concatenate([[0.0], size])
-        direction, far = np.array([1.0, 0.0, 0.0]), reach
+            size, states = expected.size, expected.states
+        direction, far, slope = ALONG, reach, self._slope(near, across, expected)
         if self.kind == "fold":
             direction, far = special.direction * [0.0, 1.0, 1.0], ContinuationSettings.current().fold_search_depth
             direction = direction / np.linalg.norm(direction)
-        located = corrected(tracer, point, start, direction, self.kind, far, states, slope)
+        located = met(tracer, special, np.concatenate([[0.0], size]), direction, far, states, slope)
         if located is None or abs(located.point.place) > reach:
             return None
         return Spot(origin + located.point.place * across, located, across)
 
-    def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
+    def _slope(self, near: Spot, across: np.ndarray, expected: Expected | None) -> float:
         """Estimate how fast the multiplier changes along the line on which a point is expected.
 
         The slope across the curve is taken from the point `near`; along an oblique line it is smaller. Returns NaN if
@@ -133,6 +131,8 @@ class CurveTracer:
         """
         if self.kind == "fold":
             return near.special.slope
+        if expected is None:  # the lines are parallel
+            return near.special.slope / float(near.special.direction[0])
         normal = expected.direction[::-1] * [-1.0, 1.0]
         crossing = float(normal @ near.across)
         if abs(crossing) < ContinuationSettings.current().grazing_sine:

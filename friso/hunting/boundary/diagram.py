@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.settings import ContinuationSettings
@@ -16,6 +15,7 @@ from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
+from friso.hunting.what_attracts import attractors_beside
 from friso.progress import Progress, Tally, silent
 
 BRANCHES = "following branches of cycles"
@@ -76,7 +76,8 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int | None = None, progress
     places = np.linspace(0, 1, settings.range_stages if seeds is None else seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
-    sought, surveyed = families(stages, stages.searching_rtol(rtol)), attractors(stages, rtol=rtol)
+    sought = families(stages, stages.searching_rtol(rtol))
+    surveyed = attractors_beside(stages, sought, rtol)
     hundredth = space.hundredth(np.zeros(1), np.ones(1))
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []

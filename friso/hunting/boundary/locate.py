@@ -6,7 +6,7 @@ A multiplier passes -1 (flip), 1 (fold) or the unit circle (torus).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -15,7 +15,8 @@ import numpy as np
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.crossing import crossing, turn
 from friso.hunting.boundary.settings import ContinuationSettings
-from friso.hunting.settings import ToleranceSettings
+from friso.hunting.cycle.multipliers import decisive_of
+from friso.hunting.cycle.shooting import Condition
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
@@ -53,9 +54,17 @@ class LocatedPoint:
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
     """Return how far the multiplier is from its value at this kind of point, with a sign."""
-    if kind == "torus":
-        return abs(point.multiplier) - 1
-    return point.multiplier + (1 if kind == "flip" else -1)
+    return float(_off(kind, point.cycle.multiplier)[0])
+
+
+def _off(kind: Bifurcation, multiplier: np.ndarray) -> np.ndarray:
+    """Return how far multipliers are from their value at this kind of point, with a sign, (count,)."""
+    return np.abs(multiplier) - 1 if kind == "torus" else multiplier + (1 if kind == "flip" else -1)
+
+
+def _at(kind: Bifurcation) -> Condition:
+    """Return the condition on an orbit that it lies at this kind of point."""
+    return lambda stages, shot: _off(kind, decisive_of(stages, shot))
 
 
 def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
@@ -188,15 +197,8 @@ def _special_point(
         beside = _turning_point if kind == "fold" else _passed
         located = beside(tracer, kind, point, point.vector + step * direction, direction)
         return located or LocatedPoint(kind, point, direction, np.inf, slope)
-    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * ToleranceSettings.current().check_rtol_factor).solve(
-        point, point.vector, direction
-    )
-    if tight is None:
-        return LocatedPoint(kind, point, direction, np.inf, slope)
-    moved = (abs(distance_to(kind, tight) - distance_to(kind, point)) + abs(distance_to(kind, point))) / abs(slope)
-    return LocatedPoint(
-        kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])), slope
-    )
+    point = replace(point, jacobians=None)  # its last row belongs to a plane, not to the special point
+    return LocatedPoint(kind, point, direction, tracer.shift(_at(kind), point), slope)
 
 
 def _passed(
@@ -259,36 +261,55 @@ def _nearest(tracer: Tracer, orbits: Sequence[Point], target: np.ndarray, normal
     return tracer.solve(near, target, normal)
 
 
-def corrected(
+def met(
     tracer: Tracer,
-    near: Point,
+    near: LocatedPoint,
     origin: np.ndarray,
     direction: np.ndarray,
-    kind: Bifurcation,
     reach: float,
     states: np.ndarray,
-    slope: float = np.nan,
+    slope: float,
 ) -> LocatedPoint | None:
-    """Find the special point along a direction from an origin by the secant method.
+    """Find a special point on a line of keys, from the one `near` it.
 
-    The point lies at most `reach` away, in the space of place (0 to 1 along the line of keys), log distance and log
-    time. The search starts from the cycle `near` the point, its approximate `states` (1, states), and the `slope` of
-    the multiplier if known. Returns None if there is no such point, or if its error is not known where a limiter
-    chatters.
+    Newton's method solves for the orbit and its multiplier together. `origin`, the guess, and `direction`, both (3,),
+    are in the space of place (0 to 1 along the line), log distance and log time. `states`, shape (1, states), lie near
+    the orbit, and `slope` is about the change of the multiplier along the direction. Returns None if there is no such
+    point within `reach` of the origin along the direction.
     """
-    settings = ContinuationSettings.current()
+    if tracer.chatters:
+        return _met_by_secants(tracer, near, origin, direction, reach, states, slope)
+    point = tracer.meet(_at(near.kind), origin, states, near.point)
+    if point is None or abs(float((point.vector - origin) @ direction)) > reach:
+        return None
+    return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point), slope)
+
+
+def _met_by_secants(
+    tracer: Tracer,
+    near: LocatedPoint,
+    origin: np.ndarray,
+    direction: np.ndarray,
+    reach: float,
+    states: np.ndarray,
+    slope: float,
+) -> LocatedPoint | None:
+    """Find a special point as `met` does, where a limiter chatters and multipliers scatter.
+
+    The secant method closes an orbit for every trial of the place, and ends where the scatter begins.
+    """
+    settings, kind = ContinuationSettings.current(), near.kind
     last_step = _last_step(tracer, kind, float(origin[0]))
-    places, points = [0.0], [tracer.solve(near, origin, direction, states)]
+    places, points = [0.0], [tracer.solve(near.point, origin, direction, states)]
     for _ in range(settings.special_point_tries):
         if (latest := points[-1]) is None:
             return None
         if len(points) > 1:
             slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
-        off, first = distance_to(kind, latest), len(points) == 1
-        step = -off / slope if slope else np.inf
-        if abs(step) < last_step and (tracer.chatters or not first or abs(off) < settings.met_multiplier_error):
+        step, first = -distance_to(kind, latest) / slope if slope else np.inf, len(points) == 1
+        if abs(step) < last_step:
             special = _special_point(tracer, kind, latest, direction, slope)
-            return special if np.isfinite(special.error) or not tracer.chatters else None
+            return special if np.isfinite(special.error) else None
         if first and not last_step <= abs(step) <= reach:
             step = max(settings.slope_step, last_step)
         elif not abs(places[-1] + step) <= reach:

@@ -10,7 +10,6 @@ from itertools import count
 import numpy as np
 
 from friso.engine.side_by_side import side_by_side
-from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
@@ -21,6 +20,8 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
+from friso.hunting.settings import EdgeSettings
+from friso.hunting.what_attracts import attractors_beside
 from friso.progress import Progress, Tally, silent
 
 CURVES = "following the edge of hunting"
@@ -100,13 +101,14 @@ def plane(space: Space, rtol: float = RTOL, nodes: int | None = None, progress: 
     """
     grid = _Grid.of(space, nodes)
     points, stages = grid.points, grid.stages
-    hunting, searches = _searches(stages, rtol)
+    sought = families(stages, stages.searching_rtol(rtol))
+    hunting, searches = sought[0], _searches(*sought)
     curves, gaps = _followed(space, grid, searches, rtol, progress)
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # stages with a stable cycle need no simulation
     if undecided.size:
         others = stages.take(undecided)
-        surveyed = attractors(others, rtol=rtol)
+        surveyed = attractors_beside(others, tuple(family.take(undecided) for family in sought), rtol)
         decided[undecided] = surely_surveyed(others, surveyed)
         attracts[undecided] = surveyed.attracts & decided[undecided]
     for a, b in grid.changes(decided & attracts, decided & ~attracts):  # other attractors, too
@@ -137,10 +139,12 @@ def _sought(
 ) -> tuple[list[Curve], list[np.ndarray]]:
     """Follow the edge of hunting between grid neighbours of which only the first has the cycle.
 
-    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours.
+    Returns the curves, and the coordinates at which no curve could be begun. `changing` are pairs of neighbours; those
+    whose cycle is nearest to a change come first, because the curve found there may pass between others as well.
     """
     points, curves, gaps = grid.points, list[Curve](), list[np.ndarray]()
-    for a, b in changing:
+    to_change = dict(zip(grid.allowed.tolist(), np.abs(np.abs(cycles.multiplier) - 1).tolist(), strict=True))
+    for a, b in sorted(changing, key=lambda pair: to_change[pair[0]]):
         tally.add(1, CURVES)
         if any(_crossed(curve, points[a], points[b]) for curve in curves):
             continue
@@ -160,19 +164,18 @@ CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
 """Cycles, and which stages lie inside and outside of a curve on which they change, as booleans."""
 
 
-def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
-    """Return the hunting cycles of stages, and between which stages to search for curves.
+def _searches(hunting: Cycles, *pairs: Cycles) -> list[CurveSearch]:
+    """Return between which stages to search for curves, from their hunting cycles and asymmetric ones.
 
     A search names stages inside and outside of a curve. In the first, the cycle attracts inside and not outside. If
     there is a second, an attracting cycle lies between asymmetric ones inside, and has none beside it outside. A stage
     that may have a cycle which was not closed is on neither side.
     """
-    hunting, *pairs = families(stages, stages.searching_rtol(rtol))
     searches = [_losing(hunting)]
     for pair in pairs:
         beside_attracting = hunting.attracting & ~pair.uncertain
         searches.append((pair, beside_attracting & pair.closed, beside_attracting & ~pair.closed))
-    return hunting, searches
+    return searches
 
 
 def _losing(hunting: Cycles) -> CurveSearch:
@@ -227,6 +230,7 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
         cycle.sign,
         rtol,
         farthest=mesh,
+        pace=EdgeSettings.current().edge_pace,
         hundredth=space.hundredth(start, across),
     )
     first = Point.of(space.stages(start[None]), 0.0, cycle)

@@ -92,9 +92,6 @@ class ContinuationSettings(Settings):
     slope_step: float = setting(1e-3, "")
     """Step of the difference that gives the slope. If smaller it is rounding; if larger it includes the next bend."""
 
-    met_multiplier_error: float = setting(1e-5, "")
-    """Error of the multiplier at which a first guess needs no further step."""
-
     chattering_fold_reach: float = setting(0.03, "")
     """Largest distance from a fold at which the multiplier may be 1, where a limiter chatters."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.guess import Guess, symmetric_guess, whole_guess
-from friso.hunting.cycle.multipliers import multipliers
+from friso.hunting.cycle.multipliers import decisive, multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.settings import OrbitSettings
@@ -273,9 +273,6 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     high, low = floquet.high, floquet.low
     if shut.sign < 0:
         high, low = np.maximum(high, -low), np.minimum(low, -high)
-    first = floquet.local[:, 0]
-    complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
-    decisive = floquet.slope if subset.chatters else np.where(complex_pair, np.abs(first), np.real(first))
     values = {
         "period": periods,
         "amplitude": (high - low) / 2,
@@ -284,7 +281,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
         "local": floquet.local,
         "direction": floquet.direction,
         "slope": floquet.slope,
-        "multiplier": decisive,
+        "multiplier": floquet.slope if subset.chatters else decisive(floquet.local),
     }
     for name, value in values.items():
         getattr(cycles, name)[which] = value

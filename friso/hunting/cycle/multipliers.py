@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.settings import OrbitSettings
-from friso.hunting.cycle.shooting import Orbits, shoot
+from friso.hunting.cycle.shooting import Orbits, Shot, shoot
 from friso.hunting.cycle.swings import swings
 from friso.hunting.settings import ToleranceSettings
 
@@ -45,6 +45,22 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     slope = slopes(stages, orbits, direction, rtol) if stages.chatters else np.full(stages.count, np.nan)
     high, low = (np.where(shot.done, extreme, np.nan) for extreme in (shot.high, shot.low))
     return Multipliers(local, direction, slope, high, low)
+
+
+def decisive(local: np.ndarray) -> np.ndarray:
+    """Return the multiplier that decides whether orbits are stable, (count,).
+
+    `local`, shape (count, n), are multipliers with the largest first. That one decides; of a complex pair, its
+    magnitude.
+    """
+    first = local[:, 0]
+    complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
+    return np.where(complex_pair, np.abs(first), np.real(first))
+
+
+def decisive_of(stages: Ensemble, shot: Shot) -> np.ndarray:
+    """Return the multiplier that decides whether orbits are stable, (count,), from shots along them."""
+    return decisive(_floquet(stages, shot.flows, stages.rates(shot.ends))[0])
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -149,8 +149,19 @@ class OrbitSettings(Settings):
     followed_stalled_steps: tuple[int, int, int] = setting((3, 3, 1), "")
     """Steps in which the gap must halve along a branch, where the next orbit is near."""
 
-    place_nudge: float = setting(1e-5, "")
+    place_nudge: float = setting(1e-6, "")
     """Change of place for a numerical derivative. If smaller it is rounding; if larger it includes curvature."""
+
+    place_nudge_chattering: float = setting(1e-5, "")
+    """Change of place for a numerical derivative where a limiter chatters, which moves the end of a run."""
+
+    condition_gap_share: float = setting(1e-3, "")
+    """Gap per error of a condition on orbits. With more, the scatter of multipliers keeps Newton's method from ending;
+    with less, it ends too early."""
+
+    branch_nudges: tuple[float, float] = setting((1e-6, 1e-4), "")
+    """Smallest and largest relative change of an orbit along its branch for a numerical derivative of the multiplier. A
+    smaller one is rounding; a larger one includes curvature."""
 
     swing_leg_share: float = setting(0.5, "of the distance")
     """Smallest leg of the zigzag that counts as a swing. Smaller legs are ringing of a stage that sticks."""

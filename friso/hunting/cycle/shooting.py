@@ -20,7 +20,7 @@ from friso.hunting.settings import ToleranceSettings
 
 
 @dataclass(frozen=True)
-class Shot:
+class Shot(ArrayRows):
     """Result of integrating orbits from initial states (count, states) over times [s] (count,).
 
     `ends` are the final states, mirrored after half a period. `flows` (count, states, states) are their derivatives
@@ -118,12 +118,16 @@ class Border:
 Family = Callable[[np.ndarray, np.ndarray], Ensemble]
 """Function that makes stages from the numbers of lines and one place on each, both (count,)."""
 
+Condition = Callable[[Ensemble, Shot], np.ndarray]
+"""Function that returns how far orbits are from meeting a condition, (count,), from their stages and shots."""
+
 
 class Followed(NamedTuple):
     """Orbits, the places of their stages along a line of keys, and the last Jacobians.
 
-    The Jacobians, shape (count, states + 2, states + 2), closed these orbits and start the search for nearby ones. They
-    are NaN where a limiter chatters, because they change too fast there.
+    The Jacobians, shape (count, states + 2, states + 2), closed these orbits and start the search for nearby ones. The
+    last row of each has the derivatives of the distance from the border, or of the condition. They are NaN where a
+    limiter chatters, because they change too fast there.
     """
 
     orbits: Orbits
@@ -158,6 +162,44 @@ def close_along(
     return Followed(replace(orbits, swings=swings or orbits.swings), following.best_places, following.best_jacobians)
 
 
+def close_where(
+    condition: Condition,
+    family: Family,
+    orbits: Orbits,
+    places: np.ndarray,
+    rtol: float,
+    jacobians: np.ndarray | None = None,
+) -> Followed:
+    """Close orbits while their stages move along lines of keys, until each meets a condition as well.
+
+    Newton's method solves for orbit, time and place together. It starts from approximate `orbits` and `places`, with
+    `jacobians` of orbits that meet the condition nearby, if known. Runs have the relative tolerance `rtol`.
+    """
+    meeting = _iterated(_Meeting(condition, family, orbits, places, rtol, jacobians))
+    closed = replace(meeting.orbits, swings=orbits.swings)
+    return Followed(closed, meeting.best_places, meeting.best_jacobians)
+
+
+def moved_by(
+    condition: Condition,
+    family: Family,
+    orbits: Orbits,
+    places: np.ndarray,
+    rtol: float,
+    jacobians: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return how far the places at which orbits meet a condition move at another tolerance, (count,).
+
+    Two Newton steps at the relative tolerance `rtol` lead from the `orbits` and `places` of `close_where` to the new
+    ones; the second corrects the first. The result is infinite where a run fails. The other arguments are those of that
+    function.
+    """
+    meeting = _Meeting(condition, family, orbits, places, rtol, jacobians)
+    meeting.advance()
+    meeting.advance()
+    return np.where(np.isfinite(meeting.gaps), meeting.places - places, np.inf)
+
+
 _S = TypeVar("_S", bound="_Shooting")
 
 
@@ -166,6 +208,8 @@ class _Shooting:
 
     Where a limiter chatters, every step computes a new Jacobian until the gap is small; then the last one is kept.
     """
+
+    condition: Condition | None = None
 
     def __init__(
         self,
@@ -211,21 +255,26 @@ class _Shooting:
         """
         settings = OrbitSettings.current()
         stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
-        if renew:
-            shot = shoot(stages, states, times, self.sign, self.rtol)
+        shot = shoot(stages, states, times, self.sign, self.rtol) if renew or self.condition else None
+        if shot:
             ends, fine = shot.ends, shot.done
-            for k, jacobian in zip(which, self._jacobians(which, stages, shot), strict=True):
-                self.inverses[k] = _inverse(jacobian)
         else:
             results = stages.run(states, times, self.rtol)
             ends, fine = self.sign * results.ends, done(results)
-        misses = ends - states
+        misses, residual = ends - states, self._residual(which, stages, shot)
         gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
-        self.serves[which] = renew | (gaps < np.maximum(settings.old_jacobian_share * self.gaps[which], self.finest))
+        if self.condition:
+            gaps = np.maximum(gaps, np.abs(residual[:, -1]) * settings.condition_gap_share)
+            gaps = np.where(np.isnan(gaps), np.inf, gaps)
+        serves = gaps < np.maximum(settings.old_jacobian_share * self.gaps[which], self.finest)
+        if shot and (fresh := np.flatnonzero(renew | ~serves)).size:
+            jacobians = self._jacobians(which[fresh], stages.take(fresh), shot.take(fresh))
+            for k, jacobian in zip(which[fresh], jacobians, strict=True):
+                self.inverses[k] = _inverse(jacobian)
+        self.serves[which] = serves | (shot is not None)
         # orbits whose old Jacobian no longer serves are shot again from where they are
         kept = self.serves[which] | self.chatters
         self._keep_best(which[kept], gaps[kept])
-        residual = self._residual(which, stages)
         scales = stages.scales
         for k, miss, other, scale in zip(which[kept], misses[kept], residual[kept], scales[kept], strict=True):
             self._step(k, np.concatenate([miss, other]), stages.sticking, scale)
@@ -244,7 +293,7 @@ class _Shooting:
         jacobians[:, size, stages.sticking] = -stages.relaxed
         return jacobians
 
-    def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+    def _residual(self, which: np.ndarray, stages: Ensemble, shot: Shot | None = None) -> np.ndarray:
         """Return the phase error, (orbits, 1): the imbalance of integrator and constant forces."""
         return stages.unbalanced(self.states[which])[:, None]
 
@@ -306,11 +355,13 @@ class _Following(_Shooting):
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.stalled = OrbitSettings.current().followed_stalled_steps
+        settings = OrbitSettings.current()
+        self.stalled = settings.followed_stalled_steps
+        self.nudge = settings.place_nudge_chattering if self.chatters else settings.place_nudge
         if self.chatters:
             self.finest = tolerances.followed_gap
         else:
-            self.limit = tolerances.followed_gap
+            self.finest, self.limit = max(self.finest, tolerances.closed_gap), tolerances.followed_gap
         # for each orbit, its last step and the residual that the step should have removed
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -334,14 +385,18 @@ class _Following(_Shooting):
         """
         if latest := self.latest[k]:
             step, before = latest
-            inverse, weights = self.inverses[k], np.concatenate([scales, [self.times[k], 1.0]]) ** -2.0
-            row, closer = weights * step @ inverse, inverse @ (residual - before)
-            if change := float(weights * step @ closer):
+            inverse, weighted = self.inverses[k], step * self._weights(k, scales)
+            row, closer = weighted @ inverse, inverse @ (residual - before)
+            if change := float(weighted @ closer):
                 self.inverses[k] = inverse + np.outer(step - closer, row) / change
                 self.jacobians[k] = _inverse(self.inverses[k])
         step = super()._step(k, residual, sticking, scales)
         self.latest[k] = step, residual
         return step
+
+    def _weights(self, k: int, scales: np.ndarray) -> np.ndarray:
+        """Return weights of a step of the orbit numbered `k`, (states + 2,); `scales` are the states' magnitudes."""
+        return np.concatenate([scales, [self.times[k], 1.0]]) ** -2.0
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Store the best orbits so far with their Jacobians; `gaps` are the errors of closing."""
@@ -371,7 +426,7 @@ class _Following(_Shooting):
         stale = which[~serves]
         if stale.size:
             behind, ahead = self._beside(stale)
-            self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * settings.place_nudge)
+            self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * self.nudge)
         self._set_border(which, stages)
         for k in which:
             self.latest[k] = None
@@ -382,19 +437,75 @@ class _Following(_Shooting):
 
         Returns the final states and the phase error of each run, shape (2, orbits, states + 1).
         """
-        settings = OrbitSettings.current()
-        both = np.concatenate([which, which])
-        nudge = np.repeat([-settings.place_nudge, settings.place_nudge], len(which))
+        both, nudge = np.concatenate([which, which]), np.repeat([-self.nudge, self.nudge], len(which))
         stages = self.family(both, self.places[both] + nudge)
         ends = self.sign * stages.run(self.states[both], self.times[both], self.rtol).ends
         return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
-    def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+    def _residual(self, which: np.ndarray, stages: Ensemble, shot: Shot | None = None) -> np.ndarray:
         """Return the phase errors of orbits and their distances from the borders, (orbits, 2)."""
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
         where = np.stack([self.places[which], *np.log(sizes)], axis=1)
         residual = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
         return np.hstack([super()._residual(which, stages), residual[:, None]])
+
+
+class _Meeting(_Following):
+    """Orbits on lines of keys, each followed to the place at which it meets a condition.
+
+    The last row of a Jacobian has the derivatives of the condition along the branch of closed orbits. Across it, where
+    orbits are not closed, they are only learnt from the steps.
+    """
+
+    def __init__(
+        self,
+        condition: Condition,
+        family: Family,
+        orbits: Orbits,
+        places: np.ndarray,
+        rtol: float,
+        jacobians: np.ndarray | None,
+    ) -> None:
+        super().__init__(family, orbits.states, orbits.times, orbits.sign, rtol, places)
+        tolerances = ToleranceSettings.current()
+        self.condition = condition
+        self.limit, self.finest = tolerances.closed_gap, tolerances.gap_rtol_factor * tolerances.closed_gap
+        if jacobians is not None:
+            self.jacobians = jacobians.copy()
+            self.inverses = [_inverse(jacobian) for jacobian in jacobians]
+            self.serves[:] = True
+
+    def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
+        """Leave the last row of Jacobians, which belongs to the condition."""
+
+    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        """Return derivatives of all errors of orbits by state, time and place along the keys' line.
+
+        The condition is differentiated by orbits a little farther along the branch: about as far as the next step goes.
+        """
+        assert self.condition
+        before, size = self.jacobians[which, -1], self.states.shape[1]
+        jacobians = super()._jacobians(which, stages, shot)
+        along = np.array([_null(rows) for rows in jacobians[:, :-1]])
+        sizes = np.stack([self.states[which, stages.sticking], self.times[which], np.ones(len(which))], axis=1)
+        along /= np.max(np.abs(along[:, [stages.sticking, -2, -1]] / sizes), axis=1, keepdims=True)
+        off, (least, most) = self.condition(stages, shot), OrbitSettings.current().branch_nudges
+        with np.errstate(all="ignore"):
+            needed = np.abs(off / np.einsum("ki,ki->k", before, along))
+        along *= np.clip(np.nan_to_num(needed, nan=most), least, most)[:, None]
+        states, times = self.states[which] + along[:, :size], self.times[which] + along[:, size]
+        there = self.family(which, self.places[which] + along[:, -1])
+        change = self.condition(there, shoot(there, states, times, self.sign, self.rtol)) - off
+        for k, step, by, scales in zip(which, along, change, stages.scales, strict=True):
+            weighted = step * self._weights(k, scales)
+            self.jacobians[k, -1] = by / (weighted @ step) * weighted
+        return self.jacobians[which]
+
+    def _residual(self, which: np.ndarray, stages: Ensemble, shot: Shot | None = None) -> np.ndarray:
+        """Return the phase errors of orbits, and how far they are from meeting the condition, (orbits, 2)."""
+        assert self.condition
+        assert shot
+        return np.stack([_Shooting._residual(self, which, stages)[:, 0], self.condition(stages, shot)], axis=1)
 
 
 def _iterated(shooting: _S) -> _S:
@@ -403,6 +514,13 @@ def _iterated(shooting: _S) -> _S:
         if not shooting.advance():
             break
     return shooting
+
+
+def _null(rows: np.ndarray) -> np.ndarray:
+    """Return the direction in which linear equations, shape (n - 1, n), stay fulfilled; NaN if they are not finite."""
+    if not np.isfinite(rows).all():
+        return np.full(rows.shape[1], np.nan)
+    return np.linalg.svd(rows / np.abs(rows).max(axis=1, keepdims=True))[2][-1]
 
 
 def _inverse(jacobian: np.ndarray) -> np.ndarray:
