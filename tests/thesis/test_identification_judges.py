@@ -51,7 +51,7 @@ def of_plant(changes: dict[str, str]) -> Finding:
 def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]) -> None:
     finding = judged(claim)
     assert finding.pattern == holds, finding
-    assert all(part.holds or part.why or part.undecided for part in finding.parts)
+    assert all(part.holds or part.why or part.open for part in finding.parts)
     assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 

@@ -75,7 +75,7 @@ from friso_thesis.studies.thesis.kept import SOURCES, Kept, kept_findings
 from friso_thesis.studies.thesis.laws import conclusions_by_law
 from friso_thesis.studies.thesis.linear import NEEDS
 from friso_thesis.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
-from friso_thesis.studies.thesis.plausible import PARTS, plausible
+from friso_thesis.studies.thesis.plausible import PARTS, _in_space, plausible
 from friso_thesis.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
 from friso_thesis.studies.thesis.reproduce import _changed
 from friso_thesis.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
@@ -207,7 +207,7 @@ def test_the_noise_of_fig_28_is_varied() -> None:
         Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=standstill(1e-8, 1e-7))))
     )
     assert not finding.parts[0].holds
-    assert "with 10 times the noise it is met" in finding.parts[0].undecided
+    assert "with 10 times the noise it is met" in finding.parts[0].beyond
     assert finding.table is not None
     assert len(finding.table.rows) == 3
 
@@ -547,15 +547,32 @@ def test_judgements_of_parts() -> None:
     ]
 
 
+def test_a_criterion_beside_its_threshold_leaves_open_what_it_could_turn() -> None:
+    beside_threshold, yes, no = Part("a", True, "1", undecided=BESIDE), Part("b", True, "2"), Part("c", False, "3")
+    assert Finding((beside_threshold, yes)).judgement == "cannot be decided"
+    assert Finding((beside_threshold, no)).judgement == "cannot be decided"
+    assert Finding((beside_threshold, yes, no)).judgement == "holds in part"
+    assert Finding((yes, no)).judgement == "holds in part"
+
+
+def test_a_draw_without_a_failing_criterion_is_undecided_if_one_is_open() -> None:
+    tried = [[Part("a", holds, "1", undecided=open_)] for holds, open_ in ((True, ""), (True, BESIDE), (False, ""))]
+    tried += [[Part("a", False, "1"), Part("b", True, "2", undecided=BESIDE)]]
+    found = [(draw(k), Finding(tuple(parts))) for k, parts in enumerate(tried)]
+    space = _in_space(registered()["S41"], found[:3], {})
+    assert (space.count, space.undecided, space.misses) == (1, 1, 1)
+    assert _in_space(registered()["S41"], found[3:], {}).misses == 1
+
+
 def test_an_undecided_part_counts_for_nothing_and_says_why() -> None:
-    beyond = Part("beyond", False, "1", undecided="Simulation cannot decide this. More.")
+    beyond = Part("beyond", False, "1", beyond="Simulation cannot decide this. More.")
     alone, beside_another = Finding((beyond,)), Finding((beyond, Part("met", True, "2")))
     assert (alone.judgement, beside_another.judgement) == ("cannot be decided", "holds")
     assert beside_another.pattern == (None, True)
     item = verdict(claims()[0], "1", beside_another)
     assert (item.judgement, item.reason) == ("holds", "")
     assert reasons(item) == ["Criterion 1: Simulation cannot decide this."]
-    assert ("Reason", beyond.undecided) in details(item)
+    assert ("Reason", beyond.beyond) in details(item)
 
 
 def test_a_number_beside_its_threshold_is_undecided() -> None:

@@ -39,7 +39,7 @@ _VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("depends", "depends on what the thesis leaves open", "depend on what the thesis leaves open"),
     ("holds in part", "holds in part", "hold in part"),
     ("differs", "does not hold", "do not hold"),
-    ("cannot be decided", "cannot be decided by simulation", "cannot be decided by simulation"),
+    ("cannot be decided", "cannot be decided", "cannot be decided"),
     ("not yet covered", "is not covered", "are not covered"),
 )
 """Verbs for each judgement, of one claim and of several."""
@@ -115,7 +115,7 @@ def _part(part: Part) -> dict[str, Any]:
         "holds": part.holds,
         "number": part.number,
         "why": part.why or None,
-        "undecided": part.undecided or None,
+        "undecided": part.open or None,
         "printed": part.printed,
         "read": part.read,
     }

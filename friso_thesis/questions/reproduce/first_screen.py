@@ -43,11 +43,12 @@ OTHER_REASON = (
     ),
     Remark(
         "S41M", 0, False,
-        "More mass ends hunting, but not because the integral action builds up more slowly.",
+        "More mass ends hunting, but after this move not because the integral action builds up more slowly.",
     ),
     Remark(
         "S342F", 0, False,
-        "A higher crossover settles sooner, but one beside the first eigenfrequency is stable too.",
+        "A higher crossover settles sooner, but the loop is also stable within a factor of 3 of the first "
+        "eigenfrequency.",
     ),
     Remark(
         "S323C", 1, False,
@@ -68,8 +69,8 @@ SLIPS = (
     ),
     Remark(
         "F18", 1, False,
-        "2.5 kg instead of 1.7, and 0.75 instead of 0.5, are one slip: a motor that gives 0.68 and 0.67 of the force "
-        "assumed shows both.",
+        "2.5 kg instead of 1.7, and 0.75 instead of 0.5, would be one slip: a motor that gives 0.68 and 0.67 of the "
+        "force assumed would show both.",
     ),
     Remark(
         "F14A", 1, False,
@@ -101,9 +102,15 @@ def remarks(of: Iterable[Remark], verdicts: Mapping[str, ClaimVerdict]) -> list[
 
 
 def as_far(verdict: ClaimVerdict) -> str:
-    """Return a remark in brackets if some criterion of a claim is undecided; "" otherwise."""
-    beyond = None in verdict.finding.pattern if verdict.finding else False
-    return " (as far as simulation decides)" if beyond else ""
+    """Say in brackets how many criteria of a claim simulation decides; "" if it decides all."""
+    pattern = verdict.finding.pattern if verdict.finding else ()
+    decided = len(pattern) - pattern.count(None)
+    return f" (simulation decides {decided} of {len(pattern)} criteria)" if decided < len(pattern) else ""
+
+
+def more_right(verdicts: Iterable[ClaimVerdict]) -> int:
+    """Return how many claims hold that are not in the thesis's own list of conclusions."""
+    return sum(verdict.judgement == "holds" and not verdict.claim.listed for verdict in verdicts)
 
 
 def right(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:

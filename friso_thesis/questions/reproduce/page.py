@@ -88,6 +88,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "verdicts": verdicts,
             "right": first_screen.right(verdicts),
             "as_far": first_screen.as_far,
+            "more_right": first_screen.more_right(verdicts),
             "other_reason": first_screen.remarks(first_screen.OTHER_REASON, by_claim),
             "slips": first_screen.remarks(first_screen.SLIPS, by_claim),
             "counts": _counts(verdicts),

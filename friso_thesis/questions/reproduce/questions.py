@@ -93,9 +93,7 @@ QUESTIONS: tuple[ThesisQuestion, ...] = (
         "Not all relations between parameters are taken into account (Sec. 5)",
         "friso tune examples/thesis_rig.toml",
         "all settings at once: the least change that stops hunting; friso guideline has the law over all groups",
-        lambda: (
-            f"beyond pairs: {len(OPEN)} values are drawn jointly here, and every claim says on which of them it hangs"
-        ),
+        lambda: f"beyond pairs: {len(OPEN)} values are drawn jointly here, and a claim names those that decide on it",
     ),
     ThesisQuestion(
         "Friction depends on the position (Sec. 4.2.3, 4.3.2)",

@@ -92,7 +92,7 @@ def attracts(verdict: ClaimVerdict) -> str:
 
 def criterion_word(part: Part) -> str:
     """Return "agrees" or "does not agree" for a criterion, or "undecided"."""
-    return "undecided" if part.undecided else "agrees" if part.holds else "does not agree"
+    return "undecided" if part.open else "agrees" if part.holds else "does not agree"
 
 
 def reasons(verdict: ClaimVerdict) -> list[str]:
@@ -114,7 +114,7 @@ def reasons(verdict: ClaimVerdict) -> list[str]:
 
 def _why(part: Part) -> str:
     """Return why a criterion is not met, or is undecided; "" if it is met."""
-    return part.undecided or ("" if part.holds else part.why)
+    return part.open or ("" if part.holds else part.why)
 
 
 def _first_sentence(text: str) -> str:

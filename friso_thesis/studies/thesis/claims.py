@@ -62,9 +62,10 @@ class Part:
 
     `why` gives the reason if it is not met, in whole sentences, the most important first. `printed` is a number that
     the thesis prints and `read` the one that friso finds, both in the same unit, NaN without one. A `self_test` checks
-    that friso finds what friso entered: it says nothing about the thesis, and counts for no judgement. An `undecided`
-    part counts for none either. Its text says why: no simulation can decide it, or the number lies beside its threshold
-    within its error.
+    that friso finds what friso entered: it says nothing about the thesis, and counts for no judgement. A part
+    `beyond` simulation counts for none either; the text says why. A part that is `undecided` could be decided, but was
+    not: its text says that the number lies beside its threshold, within its error, or that there was nothing to
+    compare.
     """
 
     criterion: str
@@ -74,11 +75,21 @@ class Part:
     printed: float = math.nan
     read: float = math.nan
     self_test: bool = False
+    beyond: str = ""
     undecided: str = ""
+
+    @property
+    def open(self) -> str:
+        """Return why the criterion is not decided; "" if it is."""
+        return self.beyond or self.undecided
 
 
 BESIDE = "The number lies beside its threshold, within its error."
 """Reason for which a part is undecided."""
+
+
+NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare."
+"""Reason for which a comparison is undecided."""
 
 
 def beside(value: float, thresholds: Iterable[float], error: float) -> str:
@@ -108,20 +119,24 @@ class Finding:
 
     @property
     def pattern(self) -> tuple[bool | None, ...]:
-        """Return for each criterion about the thesis whether it is met; None if it is undecided."""
-        return tuple(None if part.undecided else part.holds for part in self.stated)
+        """Return for each criterion about the thesis whether it is met; None if it is not decided."""
+        return tuple(None if part.open else part.holds for part in self.stated)
 
     @property
     def judgement(self) -> ClaimJudgement:
-        """Return the judgement that follows from the criteria of the claim.
+        """Return the judgement that follows from the criteria of the claim, without those beyond simulation.
 
-        The judgement is "holds" if all decided criteria are met, "differs" if none is, else "holds in part"; "cannot be
-        decided" if no criterion is decided.
+        The judgement is "holds" if all are met, "differs" if none is, and "holds in part" if some are met and some are
+        not. If there are no criteria, or one that is undecided could turn "holds" or "differs", it is "cannot be
+        decided".
         """
-        decided = [holds for holds in self.pattern if holds is not None]
-        if not decided:
+        criteria = [part for part in self.stated if not part.beyond]
+        decided = {part.holds for part in criteria if not part.undecided}
+        if len(decided) == 2:
+            return "holds in part"
+        if not criteria or any(part.undecided for part in criteria):
             return "cannot be decided"
-        return "holds" if all(decided) else "holds in part" if any(decided) else "differs"
+        return "holds" if decided == {True} else "differs"
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:

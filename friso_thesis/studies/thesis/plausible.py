@@ -72,8 +72,8 @@ class ClaimInSpace:
 
     `seeds` identifies each draw by (random seed, number of the draw). `holds` is the fraction, and `count` the number,
     of draws in which the claim holds; `parts` has the fraction for each part of the claim. `hangs_on` lists the values
-    that decide whether the claim holds, the most decisive first. `failures` maps the number of a draw to the reason why
-    the claim could not be computed for it.
+    that decide whether the claim holds, the most decisive first. In `undecided` draws no criterion fails, but some are
+    not decided. `failures` maps the number of a draw to the reason why the claim could not be computed for it.
     """
 
     seeds: tuple[tuple[int, int], ...]
@@ -81,12 +81,8 @@ class ClaimInSpace:
     count: int
     parts: tuple[MetPart, ...]
     hangs_on: tuple[Separation, ...]
+    undecided: int
     failures: Mapping[int, str]
-
-    @property
-    def undecided(self) -> int:
-        """Return for how many random choices of the open values the claim could not be computed."""
-        return len(self.failures)
 
     @property
     def draws(self) -> int:
@@ -233,15 +229,16 @@ are of other types."""
 def _in_space(
     entry: Registered, tried: Sequence[tuple[Draw, Finding | None]], failures: Mapping[int, str]
 ) -> ClaimInSpace:
-    decided = [(one, finding) for one, finding in tried if finding]
+    findings = [(one, finding) for one, finding in tried if finding]
+    decided = [(one, finding) for one, finding in findings if finding.judgement == "holds" or False in finding.pattern]
     holds = np.array([finding.judgement == "holds" for _, finding in decided], bool)
-    patterns = [finding.pattern for _, finding in decided]
     return ClaimInSpace(
         tuple((SEED, one.number) for one, _ in tried),
         _share(holds, len(tried)),
         int(holds.sum()),
-        tuple(_met(column, len(tried)) for column in zip(*patterns, strict=True)),
+        tuple(_met(column, len(tried)) for column in zip(*(finding.pattern for _, finding in findings), strict=True)),
         tuple(_separations(entry, [one for one, _ in decided], holds)),
+        len(tried) - len(decided),
         failures,
     )
 

@@ -158,7 +158,7 @@ def verdict(
         for name, other in others.items()
         if other.pattern != finding.pattern
     }
-    failing = [part for part in finding.stated if not part.holds and not part.undecided]
+    failing = [part for part in finding.stated if not part.holds and not part.open]
     reason = " ".join(dict.fromkeys(part.why for part in failing if part.why))
     if failing and not reason:
         reason = "No reason was found."

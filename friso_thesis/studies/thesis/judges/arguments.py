@@ -143,20 +143,20 @@ def why_mass_helps(evidence: Evidence) -> Finding:
     """
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
-    why = "" if np.isfinite([*light, *heavy]).all() else "One of the two has no overshoot: there is nothing to compare."
+    undecided = "" if np.isfinite([*light, *heavy]).all() else "One of the two does not overshoot: nothing to compare."
     return Finding(
         (
             Part(
                 "where it first slips across the reference the heavier cart accelerates less after break-away",
                 heavy[0] < light[0],
                 _compared(names, (light[0], heavy[0]), "m/s^2"),
-                why,
+                undecided=undecided,
             ),
             Part(
                 "it then overshoots the reference less",
                 heavy[1] < light[1],
                 _compared(names, (1e3 * light[1], 1e3 * heavy[1]), "mm"),
-                why,
+                undecided=undecided,
             ),
         )
     )

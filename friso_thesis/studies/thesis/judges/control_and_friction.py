@@ -35,7 +35,7 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], *axes)
     peaks = peak_counts(evidence.maps["friction"], *axes)
     gap = static[:, None] - coulomb[None, :]
-    smallest = smallest_gap(evidence)
+    smallest, error = smallest_gap(evidence)
     rises = trend(gap[moving], peaks[moving])
     at_static = _mean_rank_correlation(gap, peaks, moving)
     at_coulomb = _mean_rank_correlation(gap.T, peaks.T, moving.T)
@@ -55,7 +55,7 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
                 f"smallest gap {smallest:.2g} N" if moving.any() else "no cell keeps moving",
                 printed=_GAP,
                 read=smallest,
-                undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), limit_error(static)),
+                undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), error),
             ),
             Part(
                 "over the cells that keep moving, the count rises with the gap (rank correlation at least "
@@ -69,16 +69,17 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     )
 
 
-def smallest_gap(evidence: Evidence) -> float:
-    """Return the smallest gap F_s - F_c [N] at which a run keeps moving, over all values of F_c.
+def smallest_gap(evidence: Evidence) -> tuple[float, float]:
+    """Return the smallest gap F_s - F_c [N] at which a run keeps moving, over all values of F_c, and its error.
 
-    Limits in F_s are interpolated. Returns NaN if no run keeps moving.
+    Limits in F_s are interpolated. The gap is NaN if no run keeps moving.
     """
     axes = ("friction.static", "friction.coulomb")
     runs = evidence.maps["friction"]
     static, coulomb, moving, _ = verdict_table(runs, *axes)
     some = moving.any(axis=0)
-    return float((begins(static, moving, sizes(runs, *axes)) - coulomb)[some].min()) if some.any() else np.nan
+    smallest = float((begins(static, moving, sizes(runs, *axes)) - coulomb)[some].min()) if some.any() else np.nan
+    return smallest, limit_error(static)
 
 
 @judges("F12B", figure="12B", needs=("control",))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
 from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges
@@ -12,7 +14,6 @@ from friso_thesis.studies.thesis.reading import reading
 from friso_thesis.studies.thesis.studies import SOFT, thesis_rig
 
 if TYPE_CHECKING:
-    import numpy as np
     import xarray as xr
 
 _AXES = (CROSSOVER, "joint.stroke")
@@ -28,6 +29,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     long, longest = stroke >= words.long * stroke[-1], stroke >= (1 + words.long) / 2 * stroke[-1]
     shorter, longer = limits[long & ~longest].mean(), limits[longest].mean()
     error = limit_error(crossover, int(longest.sum())) / shorter * 2**0.5
+    error = np.hypot(error, 2 * np.hypot(_mean_error(limits[long & ~longest]), _mean_error(limits[longest])) / shorter)
     below = (crossover[:, None] < limits[None, :]) & long[None, :] & valid
     return Finding(
         (
@@ -62,6 +64,7 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     ratio = float(soft[long].mean() / stiff[long].mean())
     crossover = verdict_table(evidence.maps[names[0]], *_AXES)[0]
     error = limit_error(crossover, int(long.sum())) / stiff[long].mean() * 2**0.5
+    error = np.hypot(error, 2 * _mean_error(drop) / stiff[long].mean())
     return Finding(
         (
             Part(
@@ -75,6 +78,11 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
             ),
         )
     )
+
+
+def _mean_error(values: np.ndarray) -> float:
+    """Return the standard error of the mean of values, shape (n,), from their scatter."""
+    return float(values.std(ddof=1) / len(values) ** 0.5) if len(values) > 1 else 0.0
 
 
 def _limits(runs: xr.Dataset) -> np.ndarray:

@@ -11,7 +11,7 @@ from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting import find_margin
 from friso.quantities import percent
 from friso.stage import Stage, loads
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
+from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, beside, judges, number_text
 from friso_thesis.studies.thesis.judges.control_and_friction import smallest_gap
 from friso_thesis.studies.thesis.maps import begins, ends, sizes, trend, trend_text, verdict_table
 from friso_thesis.studies.thesis.reading import about, reading
@@ -148,12 +148,13 @@ def _softer_needs_less_stroke(evidence: Evidence) -> Part:
 
 def _gap(evidence: Evidence) -> Part:
     words = reading()
-    smallest = smallest_gap(evidence)
+    smallest, error = smallest_gap(evidence)
     return Part(
         f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
         f"{words.about:g})",
         about(smallest, _GAP),
         number_text(smallest, ".2g", "N") if np.isfinite(smallest) else "no cell keeps moving",
+        undecided=beside(smallest, (_GAP / words.about, _GAP * words.about), error),
     )
 
 

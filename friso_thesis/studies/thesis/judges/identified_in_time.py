@@ -64,7 +64,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
                 bool(abs(read.value / _STIFFNESS - 1) <= words.close),
                 f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
-                undecided="Simulation cannot decide this: cables, misalignment and the motor constant (Sec. 4.2.2) "
+                beyond="Simulation cannot decide this: cables, misalignment and the motor constant (Sec. 4.2.2) "
                 "are not in the model. The last alone, wrong by as much as the masses of Fig. 17 and 18 require, would "
                 f"make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} "
                 "too: the force was scaled differently there, or the joint was softer.",
@@ -109,8 +109,8 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
             Part(
                 f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
                 bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
-                f"{range_read}, lower the faster the motion",
-                undecided=f"Simulation cannot decide this: the static friction of {truth:g} N is entered (Table 2), "
+                range_read,
+                beyond=f"Simulation cannot decide this: the static friction of {truth:g} N is entered (Table 2), "
                 "and it is more than was measured.",
             ),
         )

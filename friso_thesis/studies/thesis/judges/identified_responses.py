@@ -63,7 +63,7 @@ def judged_line(line: LockedLine, moved: float) -> Finding:
                 f"the mass read off it is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
                 bool(np.nanmedian(mass) > (seen * weighed) ** 0.5),
                 f"{mass.min():.3g} to {mass.max():.3g} kg at {len(mass)} places",
-                undecided="Simulation cannot decide this: friction hardly moves the line; cables or the motor "
+                beyond="Simulation cannot decide this: friction hardly moves the line; cables or the motor "
                 f"constant (Sec. 4.2.1), not in the model, may, the latter by the factor {CONSTANTS[0]:.2f}; Fig. 18 "
                 f"asks for {CONSTANTS[1]:.2f}.",
             ),
@@ -110,7 +110,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"the mass line between them is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",
                 bool(reads[0] > (seen * weighed) ** 0.5),
                 f"{reads[0]:.3g} to {reads[1]:.3g} kg",
-                undecided=f"Simulation cannot decide this: the line lies by a factor of {factor:.2f} off, in Fig. 17 "
+                beyond=f"Simulation cannot decide this: the line lies by a factor of {factor:.2f} off, in Fig. 17 "
                 f"by {CONSTANTS[0]:.2f}; one error of the motor constant, which is not in the model, {both} both (to "
                 f"{percent(words.close)}), and the first mode does not depend on it.",
             ),

@@ -107,7 +107,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
                 about(near, FURTHER),
                 f"tuned to {highest:g} Hz it crosses again at {_frequencies(further)}, to {lowest:g} Hz at "
                 f"{_frequencies(_further(settings[lowest], lowest))}",
-                undecided=f"Simulation cannot decide this. {_why_elsewhere(evidence.analysis.contact)}",
+                beyond=f"Simulation cannot decide this. {_why_elsewhere(evidence.analysis.contact)}",
             ),
             _threatened(settings[highest], highest, further),
             *on_the_rig(evidence, measured_locked),
@@ -140,7 +140,7 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
         f"{WANTED:g} (or it is unstable)",
         bool(further) and (not margins.stable or (close and margins.modulus_margin < WANTED)),
         where,
-        undecided="Simulation cannot decide this: the mode that the thesis saw there is not in the model"
+        beyond="Simulation cannot decide this: the mode that the thesis saw there is not in the model"
         + (
             f"; without it, it would take a delay of {_micro(margins.delay_margin)} at {setting:g} Hz."
             if margins.stable
@@ -176,7 +176,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
                 highest is not None and about(highest, _MEASURED),
                 f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
-                undecided="Simulation cannot decide this: the rig's controller samples and delays, but the thesis "
+                beyond="Simulation cannot decide this: the rig's controller samples and delays, but the thesis "
                 "gives no delay, and its frame has resonances (Sec. 4.3.1) that the model does not have.",
             ),
             *on_the_rig(evidence, measured_free),

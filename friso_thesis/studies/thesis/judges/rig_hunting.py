@@ -231,7 +231,7 @@ def _weak_motor(cycles: CyclesOnRails) -> str:
 _COMPARED = ("period", "swing")
 
 
-@judges("F28", figure="28", needs=(STANDSTILL,))
+@judges("F28", figure="28", needs=(STANDSTILL,), undrawn="the noise of the drive's force")
 def free_joint_stands_less_still(evidence: Evidence) -> Finding:
     """Judge whether the rig stands less still with its joint free, and what damping recovers."""
     return judged_standstill(evidence.experiments.standstill)
@@ -255,12 +255,13 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 f"{_DEVIATIONS[1] * 1e6:g} um",
                 _sized((peaks[0], peaks[1])),
                 f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
-                undecided=f"Simulation cannot decide this. {_over_noise(standstill)}",
+                beyond=f"Simulation cannot decide this. {_over_noise(standstill)}",
             ),
             Part(
                 f"free it is of the order of {expected:g} times as large as locked",
                 about(ratio, expected, words.order),
                 f"ratio of RMS values: {number_text(ratio, '.2g')}",
+                undecided=_turned_by_noise(standstill, ratio),
             ),
             Part(
                 f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
@@ -279,6 +280,18 @@ def judged_standstill(standstill: InPosition) -> Finding:
 def _sized(peaks: tuple[float, float]) -> bool:
     words = reading()
     return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
+
+
+def _turned_by_noise(standstill: InPosition, ratio: float) -> str:
+    """Say that the noise of the force decides how far the `ratio` is from the measured one; "" if it does not."""
+    words, expected = reading(), _DEVIATIONS[1] / _DEVIATIONS[0]
+    ratios = [free / locked for locked, free in standstill.louder.values()]
+    if len({about(value, expected, words.order) for value in (ratio, *ratios)}) < 2:
+        return ""
+    return (
+        f"The noise of the force is assumed, and decides: with {' and '.join(f'{f:g}' for f in standstill.louder)} "
+        f"times as much the peaks have the ratio {' and '.join(f'{value:.2g}' for value in ratios)}."
+    )
 
 
 def _over_noise(standstill: InPosition) -> str:

@@ -63,7 +63,7 @@ def _further(loops: RigLoops) -> Part:
         any(about(f, _OTHER) for f in above),
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
-        undecided="Simulation cannot decide this: the only parasitic mode of the model is that of Fig. 18"
+        beyond="Simulation cannot decide this: the only parasitic mode of the model is that of Fig. 18"
         + (f", at {near:.3g} Hz with the joint locked." if np.isfinite(near) else "."),
     )
 
@@ -95,7 +95,7 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
             about(highest, _HIGHEST),
             f"{number_text(highest, unit='Hz')}, of settings 10 % apart, released away from its reference, the "
             "limiters not touched",
-            undecided="Simulation cannot decide this: the thesis found “resonances in the compliant joint”, of which "
+            beyond="Simulation cannot decide this: the thesis found “resonances in the compliant joint”, of which "
             "the model has one, and gives no delay.",
         ),
     )

@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.hunting.criteria import COUNTED_AFTER
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Response, judges
+from friso_thesis.studies.thesis.claims import NOTHING_TO_COMPARE, Evidence, Finding, Part, Response, judges
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,11 +73,7 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
     Also judge whether the integral action has a larger fraction of the force at break-away.
     """
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
-    why = (
-        ""
-        if wide.both and narrow.both
-        else "One of the two does not stick in both directions: there is nothing to compare."
-    )
+    undecided = "" if wide.both and narrow.both else NOTHING_TO_COMPARE
     return Finding(
         (
             Part(
@@ -85,14 +81,14 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
                 "longer with F_c 1.5 N than with 0.5 N",
                 narrow.mean(narrow.time) > wide.mean(wide.time),
                 f"{narrow.words(narrow.time, _seconds)} against {wide.words(wide.time, _seconds)}",
-                why,
+                undecided=undecided,
             ),
             Part(
                 "the mean share of the integral action in the force at break-away is larger with F_c 1.5 N than with "
                 "0.5 N",
                 narrow.mean(narrow.integral) > wide.mean(wide.integral),
                 f"{narrow.words(narrow.integral, percent)} against {wide.words(wide.integral, percent)}",
-                why,
+                undecided=undecided,
             ),
         )
     )

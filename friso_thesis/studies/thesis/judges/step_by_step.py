@@ -9,7 +9,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting.criteria import COUNTED_AFTER, SWINGS
 from friso.quantities import percent
-from friso_thesis.studies.thesis.claims import Evidence, Finding, Part, Response, judges
+from friso_thesis.studies.thesis.claims import NOTHING_TO_COMPARE, Evidence, Finding, Part, Response, judges
 from friso_thesis.studies.thesis.judges.arguments import LIGHT
 from friso_thesis.studies.thesis.judges.shares import NARROW, WIDE, Sticking, sticking
 from friso_thesis.studies.thesis.maps import trend, trend_text, verdict_table
@@ -26,8 +26,6 @@ _ISOLATED = tuple(name for name in STUDIES if name.startswith("isolator"))
 
 _COUNTED_FOR = 10.0
 """Time [s] in which peaks are counted (Sec. 3.2.2)."""
-
-NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare."
 
 
 @dataclass(frozen=True)
