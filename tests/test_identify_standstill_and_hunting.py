@@ -42,6 +42,15 @@ def test_cycles_of_hunting_are_counted_whatever_the_noise(noise: float) -> None:
     assert (shown.above, shown.below) == pytest.approx((5e-4, 2.5e-4), abs=4 * noise + 1e-6)
 
 
+def test_a_log_of_standstill_with_its_force_is_told_how_to_go_on(tmp_path: Path) -> None:
+    rng, log = np.random.default_rng(0), tmp_path / "stands.csv"
+    columns = [np.arange(3000) * STEP, np.full(3000, 0.1), 0.1 + rng.normal(0, 1e-8, 3000), rng.normal(0, 0.01, 3000)]
+    header = "time [s],reference [m],position [m],force [N]"
+    np.savetxt(log, np.column_stack(columns), delimiter=",", header=header, comments="")
+    with pytest.raises(friso.InputError, match="--as standstill"):
+        friso.identify([log])
+
+
 def test_a_log_without_cycles_is_refused(refused: Refused) -> None:
     with refused():
         swings_of(made("rests", np.linspace(1e-4, 0.0, 5000)))
@@ -61,4 +70,4 @@ def test_the_simulated_rig_hunts_as_predicted(tmp_path: Path) -> None:
     result = experiment.result
     assert isinstance(result.predicted, PredictedCycle)
     assert result.period == pytest.approx(result.predicted.period, rel=0.05)
-    assert result.amplitude == pytest.approx(result.predicted.amplitude, rel=0.25)
+    assert result.amplitude == pytest.approx(result.predicted.amplitude, rel=0.03)  # the transient is left out

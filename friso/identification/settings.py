@@ -347,6 +347,9 @@ class ExperimentSettings(Settings):
     hysteresis_of_swings: float = setting(0.3, "of half the swing")
     """Hysteresis in counting swings. With less, noise counts as hunting; with more, lopsided cycles are missed."""
 
+    transient_swing_share: float = setting(0.2, "")
+    """Largest difference in size from the later cycles. Cycles that differ more at the beginning are a transient."""
+
     # Excitations and moves, distinguished by what repeats.
 
     # Moves.

@@ -558,10 +558,10 @@ def test_a_criterion_beside_its_threshold_leaves_open_what_it_could_turn() -> No
 def test_a_draw_without_a_failing_criterion_is_undecided_if_one_is_open() -> None:
     tried = [[Part("a", holds, "1", undecided=open_)] for holds, open_ in ((True, ""), (True, BESIDE), (False, ""))]
     tried += [[Part("a", False, "1"), Part("b", True, "2", undecided=BESIDE)]]
-    found = [(draw(k), Finding(tuple(parts))) for k, parts in enumerate(tried)]
-    space = _in_space(registered()["S41"], found[:3], {})
+    judged = [(draw(k), Finding(tuple(parts))) for k, parts in enumerate(tried)]
+    space = _in_space(registered()["S41"], judged[:3], {})
     assert (space.count, space.undecided, space.misses) == (1, 1, 1)
-    assert _in_space(registered()["S41"], found[3:], {}).misses == 1
+    assert _in_space(registered()["S41"], judged[3:], {}).misses == 1
 
 
 def test_an_undecided_part_counts_for_nothing_and_says_why() -> None:

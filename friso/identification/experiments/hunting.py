@@ -57,6 +57,7 @@ def swings_of(log: Log) -> HuntingLog:
     """Return the swings in a log, from the last change of its reference on.
 
     A cycle lasts from one upward crossing of the middle of the swing to the next, with a hysteresis against noise.
+    Cycles before the first one that is about as large as the later ones are a transient, and left out.
     Raises InputError for a log without a position in SI units, or with less than two cycles.
     """
     part = log.longest
@@ -69,14 +70,19 @@ def swings_of(log: Log) -> HuntingLog:
         time, position, reference = time[start:], position[start:], reference[start:]
     deviation = position - (reference if "reference" in log else np.median(position))
     low, high = np.percentile(deviation[len(deviation) // 2 :], [1, 99])  # the later part, after the transient
-    side = _sides(deviation - (low + high) / 2, ExperimentSettings.current().hysteresis_of_swings * (high - low) / 2)
+    settings = ExperimentSettings.current()
+    side = _sides(deviation - (low + high) / 2, settings.hysteresis_of_swings * (high - low) / 2)
     ups = np.flatnonzero((side[1:] > 0) & (side[:-1] < 0)) + 1
     if len(ups) < 3:
         actual = f"{max(len(ups) - 1, 0)} whole cycles after the reference stands"
         raise InputError(f"{log.name}, position", actual, "two cycles of hunting or more", "a longer log")
     cycles = [slice(first, last) for first, last in pairwise(ups.tolist())]
     above, below = (np.array([way * (way * deviation[one]).max() for one in cycles]) for way in (1, -1))
-    periods, sizes = np.diff(time[ups]), (above - below) / 2
+    sizes = (above - below) / 2
+    settled = np.abs(sizes / np.median(sizes[len(sizes) // 2 :]) - 1) < settings.transient_swing_share
+    first = min(int(settled.argmax()), len(cycles) - 2)
+    cycles, above, below, sizes = cycles[first:], above[first:], below[first:], sizes[first:]
+    periods = np.diff(time[ups[first:]])
     peaks = np.array([one.start + int(np.argmax(deviation[one])) for one in cycles])
     return HuntingLog(
         len(cycles),

@@ -190,6 +190,11 @@ class Course:
         return f"the {self.signal} repeats every {repetition.samples} samples" if repetition else ""
 
     @property
+    def rests(self) -> bool:
+        """Tell whether the reference stands still, and nothing in the log repeats."""
+        return self.repetition is None and not self.reference_moves
+
+    @property
     def words(self) -> str:
         """Describe in words what repeats in the log, with its harmonics and reversals."""
         repetition = self.repetition
