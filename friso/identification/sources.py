@@ -273,4 +273,6 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
         return next(iter(reasons.items()))
     names = sorted(reasons or KINDS, key=lambda name: KINDS[name].around is None)
     expected = f"the kind of experiment: {', '.join(names)}"
-    raise LogError("--as", course.words, expected, f"--as {'standstill' if course.rests else names[0]}", str(path))
+    raise LogError(
+        "--as", course.words, expected, f"--as {'standstill' if course.rests and not reasons else names[0]}", str(path)
+    )

@@ -210,6 +210,13 @@ def test_the_noise_of_fig_28_is_varied() -> None:
     assert "with 10 times the noise it is met" in finding.parts[0].beyond
     assert finding.table is not None
     assert len(finding.table.rows) == 3
+    assert not finding.parts[1].undecided  # the ratio is 10 with every noise
+
+
+def test_noise_that_decides_on_the_ratio_of_fig_28_leaves_it_open() -> None:
+    varied = replace(standstill(1e-8, 1e-7), louder={1.0: (1e-8, 3e-8), 10.0: (1e-7, 6e-7)})
+    finding = registered()["F28"].judge(Evidence({}, {}, identified=cast(Any, SimpleNamespace(standstill=varied))))
+    assert "3, 6" in finding.parts[1].undecided
 
 
 def test_every_claim_is_in_the_table() -> None:
@@ -553,6 +560,19 @@ def test_a_criterion_beside_its_threshold_leaves_open_what_it_could_turn() -> No
     assert Finding((beside_threshold, no)).judgement == "cannot be decided"
     assert Finding((beside_threshold, yes, no)).judgement == "holds in part"
     assert Finding((yes, no)).judgement == "holds in part"
+
+
+def test_a_claim_that_no_draw_decides_does_not_hold() -> None:
+    judged = [(draw(k), Finding((Part("a", True, "1", undecided=BESIDE),))) for k in range(16)]
+    (claim, *_) = claims()
+    holds, fails = (
+        Finding((Part("a", True, "1"),)),
+        Finding((Part("a", True, "1", undecided=BESIDE), Part("b", False, "2"))),
+    )
+    space = _in_space(registered()["S41"], judged, {})
+    assert verdict(claim, "", holds, space=space).judgement == "cannot be decided"
+    some = _in_space(registered()["S41"], [(draw(k), holds) for k in range(16)], {})
+    assert verdict(claim, "", fails, space=some).judgement == "depends"
 
 
 def test_a_draw_without_a_failing_criterion_is_undecided_if_one_is_open() -> None:

@@ -99,7 +99,8 @@ def test_what_a_mass_does_to_the_overshoot() -> None:
     assert judged_by(slips(2.0, 1e-3), slips(1.0, 5e-4)) == (Y, Y)
     assert judged_by(slips(1.0, 1e-3), slips(2.0, 5e-4)) == (N, Y)
     assert judged_by(slips(2.0, 1e-3), slips(1.0, 2e-3)) == (Y, N)
-    assert judged_by(slips(2.0, -5e-4), slips(1.0, 2e-3)) == (None, None)  # turns before the reference: no overshoot
+    assert judged_by(slips(2.0, -5e-4), slips(1.0, 2e-3)) == (None, N)  # turns before the reference: no overshoot
+    assert judged_by(slips(2.0, -5e-4), slips(1.0, -2e-4)) == (None, None)
 
 
 def test_the_two_masses_are_compared_whatever_is_drawn() -> None:

@@ -195,11 +195,16 @@ class Tracer:
         """Find the cycle that meets a condition, from a `guess` in the space of place, log distance and log time.
 
         `states`, shape (1, states), lie near the cycle. The Jacobian of the cycle `near` it, which meets the condition
-        too, is used first, if it is known. Returns None if no cycle is found.
+        too, is used first, if it is known, then a new one. Returns None if no cycle is found.
         """
         times = near.cycle.orbits.times * np.exp(guess[2] - near.time)
         begin = replace(near.cycle.orbits, states=states, times=times)
-        return self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians))[0]
+        tries = (near.jacobians, None) if near.jacobians is not None else (None,)
+        points = (
+            self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, jacobians))[0]
+            for jacobians in tries
+        )
+        return next((point for point in points if point), None)
 
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""

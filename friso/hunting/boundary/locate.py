@@ -32,7 +32,7 @@ class LocatedPoint:
     `direction` is the direction of the branch there. `error` is the error of the place, the position from 0 to 1 in the
     key's range: the residual of the search plus the shift when computed at a hundredth of the tolerance. With a limiter
     that chatters it is the error bound of a curve through orbits beside the point. `slope` is the change of the
-    multiplier along the direction.
+    multiplier along the direction, NaN where Newton's method did not need it.
     """
 
     kind: Bifurcation
@@ -274,15 +274,15 @@ def met(
 
     Newton's method solves for the orbit and its multiplier together. `origin`, the guess, and `direction`, both (3,),
     are in the space of place (0 to 1 along the line), log distance and log time. `states`, shape (1, states), lie near
-    the orbit, and `slope` is about the change of the multiplier along the direction. Returns None if there is no such
-    point within `reach` of the origin along the direction.
+    the orbit. Where a limiter chatters, `slope` is about the change of the multiplier along the direction. Returns None
+    if there is no such point within `reach` of the origin along the direction.
     """
     if tracer.chatters:
         return _met_by_secants(tracer, near, origin, direction, reach, states, slope)
     point = tracer.meet(_at(near.kind), origin, states, near.point)
     if point is None or abs(float((point.vector - origin) @ direction)) > reach:
         return None
-    return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point), slope)
+    return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point))
 
 
 def _met_by_secants(

@@ -191,13 +191,14 @@ def moved_by(
     """Return how far the places at which orbits meet a condition move at another tolerance, (count,).
 
     Two Newton steps at the relative tolerance `rtol` lead from the `orbits` and `places` of `close_where` to the new
-    ones; the second corrects the first. The result is infinite where a run fails. The other arguments are those of that
-    function.
+    ones; the second corrects the first. The result is infinite where a run fails, or the orbit is not yet closed. The
+    other arguments are those of that function.
     """
     meeting = _Meeting(condition, family, orbits, places, rtol, jacobians)
     meeting.advance()
     meeting.advance()
-    return np.where(np.isfinite(meeting.gaps), meeting.places - places, np.inf)
+    near = (meeting.gaps < OrbitSettings.current().fresh_jacobian_gap) & np.isfinite(meeting.places)
+    return np.where(near, meeting.places - places, np.inf)
 
 
 _S = TypeVar("_S", bound="_Shooting")

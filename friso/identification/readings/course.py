@@ -191,8 +191,11 @@ class Course:
 
     @property
     def rests(self) -> bool:
-        """Tell whether the reference stands still, and nothing in the log repeats."""
-        return self.repetition is None and not self.reference_moves
+        """Tell whether the reference stands still, nothing in the log repeats, and the position does not wander off."""
+        if self.repetition is not None or self.reference_moves or "position" not in self.log:
+            return False
+        halves = np.array_split(self.log["position"][self.log.longest], 2)
+        return abs(float(halves[1].mean() - halves[0].mean())) < max(float(half.std()) for half in halves)
 
     @property
     def words(self) -> str:

@@ -115,7 +115,8 @@ def _part(part: Part) -> dict[str, Any]:
         "holds": part.holds,
         "number": part.number,
         "why": part.why or None,
-        "undecided": part.open or None,
+        "beyond": part.beyond or None,
+        "undecided": part.undecided or None,
         "printed": part.printed,
         "read": part.read,
     }

@@ -88,7 +88,7 @@ BESIDE = "The number lies beside its threshold, within its error."
 """Reason for which a part is undecided."""
 
 
-NOTHING_TO_COMPARE = "One of the two does not hunt: there is nothing to compare."
+NOTHING_TO_COMPARE = "One of the two does not stick in both directions: there is nothing to compare."
 """Reason for which a comparison is undecided."""
 
 

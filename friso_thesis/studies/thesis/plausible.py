@@ -72,8 +72,8 @@ class ClaimInSpace:
 
     `seeds` identifies each draw by (random seed, number of the draw). `holds` is the fraction, and `count` the number,
     of draws in which the claim holds; `parts` has the fraction for each part of the claim. `hangs_on` lists the values
-    that decide whether the claim holds, the most decisive first. In `undecided` draws no criterion fails, but some are
-    not decided. `failures` maps the number of a draw to the reason why the claim could not be computed for it.
+    that decide whether the claim holds, the most decisive first. A draw counts as `undecided` if no criterion fails but
+    one is open, or if the claim could not be computed; `failures` has the reasons for the latter by number of the draw.
     """
 
     seeds: tuple[tuple[int, int], ...]

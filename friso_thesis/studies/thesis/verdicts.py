@@ -46,16 +46,18 @@ class ClaimVerdict:
     def judgement(self) -> ClaimJudgement:
         """Return the judgement, at friso's own choice of the open values and at random ones.
 
-        A claim "holds" if it holds at friso's choice and in at least half of the draws. It "depends" on the values left
-        open if it holds at friso's choice or in some draw, but not so often.
+        A claim "holds" if it holds at friso's choice and in at least half of the draws that decide on it. It "depends"
+        on the values left open if it holds at friso's choice or in some draw, but not so often. It "cannot be decided"
+        if no draw decides, or if a criterion at friso's choice is open and none fails.
         """
         if self.finding is None:
             return "not yet covered"
         own, space = self.finding.judgement, self.space
-        if space is None or own == "cannot be decided":
+        if space is None or (own == "cannot be decided" and False not in self.finding.pattern):
             return own
         if own == "holds":
-            return "holds" if space.count >= space.misses else "depends"
+            decided = space.count + space.misses
+            return "cannot be decided" if not decided else "holds" if 2 * space.count >= decided else "depends"
         return "depends" if space.count else own
 
     @property

@@ -143,7 +143,9 @@ def why_mass_helps(evidence: Evidence) -> Finding:
     """
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
-    undecided = "" if np.isfinite([*light, *heavy]).all() else "One of the two does not overshoot: nothing to compare."
+    over = np.nan_to_num([light[1], heavy[1]])  # no slip across the reference is no overshoot
+    nothing = "" if over.any() else "Neither overshoots: there is nothing to compare."
+    undecided = "" if over.all() else "One of the two does not overshoot: there is no acceleration to compare."
     return Finding(
         (
             Part(
@@ -154,9 +156,9 @@ def why_mass_helps(evidence: Evidence) -> Finding:
             ),
             Part(
                 "it then overshoots the reference less",
-                heavy[1] < light[1],
+                bool(over[1] < over[0]),
                 _compared(names, (1e3 * light[1], 1e3 * heavy[1]), "mm"),
-                undecided=undecided,
+                undecided=nothing,
             ),
         )
     )

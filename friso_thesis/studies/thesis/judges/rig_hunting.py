@@ -261,7 +261,7 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 f"free it is of the order of {expected:g} times as large as locked",
                 about(ratio, expected, words.order),
                 f"ratio of RMS values: {number_text(ratio, '.2g')}",
-                undecided=_turned_by_noise(standstill, ratio),
+                undecided=_turned_by_noise(standstill),
             ),
             Part(
                 f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
@@ -282,15 +282,15 @@ def _sized(peaks: tuple[float, float]) -> bool:
     return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
 
 
-def _turned_by_noise(standstill: InPosition, ratio: float) -> str:
-    """Say that the noise of the force decides how far the `ratio` is from the measured one; "" if it does not."""
+def _turned_by_noise(standstill: InPosition) -> str:
+    """Say that the noise of the force decides whether the ratio of peaks is as measured; "" if it does not."""
     words, expected = reading(), _DEVIATIONS[1] / _DEVIATIONS[0]
     ratios = [free / locked for locked, free in standstill.louder.values()]
-    if len({about(value, expected, words.order) for value in (ratio, *ratios)}) < 2:
+    if len({about(value, expected, words.order) for value in ratios}) < 2:
         return ""
     return (
-        f"The noise of the force is assumed, and decides: with {' and '.join(f'{f:g}' for f in standstill.louder)} "
-        f"times as much the peaks have the ratio {' and '.join(f'{value:.2g}' for value in ratios)}."
+        f"The noise of the force is assumed, and decides: with {', '.join(f'{f:g}' for f in standstill.louder)} times "
+        f"as much, the peaks have the ratios {', '.join(f'{value:.2g}' for value in ratios)}."
     )
 
 
