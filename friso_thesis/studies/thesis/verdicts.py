@@ -80,6 +80,8 @@ class ClaimVerdict:
             return ""
         if self.space is None:
             sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
+        elif self.space.undecided == self.space.draws:
+            sentence = f"None of {self.space.draws} joint draws of the unstated values decides on it."
         else:
             sentence = f"It holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
             sentence += (
