@@ -191,20 +191,22 @@ class Tracer:
             points[k] = Point.of(stages.take(one), float(places[k]), cycles.take(one), jacobian)
         return points
 
-    def meet(self, condition: Condition, guess: np.ndarray, states: np.ndarray, near: Point) -> Point | None:
+    def meet(
+        self, condition: Condition, guess: np.ndarray, direction: np.ndarray, states: np.ndarray, near: Point
+    ) -> Point | None:
         """Find the cycle that meets a condition, from a `guess` in the space of place, log distance and log time.
 
-        `states`, shape (1, states), lie near the cycle. The Jacobian of the cycle `near` it, which meets the condition
-        too, is used first, if it is known, then a new one. Returns None if no cycle is found.
+        `states`, shape (1, states), lie near the cycle. The search begins with the Jacobian of the cycle `near` it,
+        which meets the condition too. If that fails, it begins again from a closed cycle on the plane through the
+        guess, whose normal is the `direction`, (3,). Returns None if no cycle is found.
         """
         times = near.cycle.orbits.times * np.exp(guess[2] - near.time)
         begin = replace(near.cycle.orbits, states=states, times=times)
-        tries = (near.jacobians, None) if near.jacobians is not None else (None,)
-        points = (
-            self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, jacobians))[0]
-            for jacobians in tries
-        )
-        return next((point for point in points if point), None)
+        point = self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians))[0]
+        if point is None and (closed := self.solve(near, guess, direction, states)):
+            places = np.array([closed.place])
+            point = self._points(close_where(condition, self._on_line, closed.cycle.orbits, places, self.rtol))[0]
+        return point
 
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""

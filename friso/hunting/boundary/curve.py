@@ -167,7 +167,8 @@ class CurveTracer:
             last = spots[-1]
             ahead = last.at + step * direction
             if np.any((ahead < 0) | (ahead > 1)):
-                return [*spots, *self._at_the_side(spots, direction, step)], END_OF_RANGE
+                side = self._at_the_side(spots, direction, step)
+                return [*spots, *side], END_OF_RANGE if side else self._lost(last)
             across, expected = direction[::-1] * [-1.0, 1.0], Expected.beyond(spots, step)
             ahead = ahead + (expected.at - ahead) @ across * across
             spot = self.on_line(ahead, across, last, settings.aside_of_prediction * step, expected)
@@ -175,7 +176,7 @@ class CurveTracer:
             if spot is None or moved @ direction < np.cos(settings.curve_turn_per_step) * np.linalg.norm(moved):
                 step /= 2
                 if step < settings.shortest_curve_step:
-                    return spots, f"it could not be followed farther than {self._named(last.at)}"
+                    return spots, self._lost(last)
                 continue
             spots = [*spots, spot]
             direction, step = unit_vector(moved), min(1.4 * step, settings.longest_curve_step)
@@ -199,6 +200,10 @@ class CurveTracer:
         spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), across, last, 2 * step, expected)
         inside = spot is not None and bool(np.all((spot.at >= 0) & (spot.at <= 1)))
         return [spot] if spot is not None and inside else []
+
+    def _lost(self, last: Spot) -> str:
+        """Return the reason why a curve ends at its last spot, if no further one is found."""
+        return f"it could not be followed farther than {self._named(last.at)}"
 
     def _named(self, at: np.ndarray) -> str:
         """Return keys with their values and units, in words, at coordinates (2,) in the box."""

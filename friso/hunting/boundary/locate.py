@@ -279,7 +279,7 @@ def met(
     """
     if tracer.chatters:
         return _met_by_secants(tracer, near, origin, direction, reach, states, slope)
-    point = tracer.meet(_at(near.kind), origin, states, near.point)
+    point = tracer.meet(_at(near.kind), origin, direction, states, near.point)
     if point is None or abs(float((point.vector - origin) @ direction)) > reach:
         return None
     return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point))
