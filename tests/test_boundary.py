@@ -273,7 +273,7 @@ def test_a_flip_is_met_from_beside_it(over_crossover: Diagram) -> None:
     near = Point.of(stages, place, symmetric_cycles(stages))
     along = np.array([1.0, 0.0, 0.0])
     beside = replace(flip, point=near)
-    reached = met(tracer, beside, near.vector, along, 0.02, near.cycle.states, slope=np.nan)
+    reached = met(tracer, beside, near.vector, along, 0.02, near.cycle.states)
     assert reached is not None
     assert reached.point.place == pytest.approx(flip.point.place, abs=1e-6)
 

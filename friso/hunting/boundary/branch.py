@@ -18,7 +18,7 @@ from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, described
-from friso.hunting.cycle.shooting import Border, Condition, Family, Followed, close_along, close_where, moved_by
+from friso.hunting.cycle.shooting import Border, Condition, ConditionSearch, Family, Followed, close_along
 from friso.hunting.settings import ToleranceSettings
 
 END_OF_RANGE = "end of the range"
@@ -202,17 +202,21 @@ class Tracer:
         """
         times = near.cycle.orbits.times * np.exp(guess[2] - near.time)
         begin = replace(near.cycle.orbits, states=states, times=times)
-        point = self._points(close_where(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians))[0]
+        point = self._points(
+            ConditionSearch(condition, self._on_line, begin, guess[:1], self.rtol, near.jacobians).closed()
+        )[0]
         if point is None and (closed := self.solve(near, guess, direction, states)):
             places = np.array([closed.place])
-            point = self._points(close_where(condition, self._on_line, closed.cycle.orbits, places, self.rtol))[0]
+            point = self._points(
+                ConditionSearch(condition, self._on_line, closed.cycle.orbits, places, self.rtol).closed()
+            )[0]
         return point
 
     def shift(self, condition: Condition, point: Point) -> float:
         """Return how far the place of a cycle that meets a condition moves at a hundredth of the tolerance."""
         tight, place = self.rtol * ToleranceSettings.current().check_rtol_factor, np.array([point.place])
-        moved = moved_by(condition, self._on_line, point.cycle.orbits, place, tight, point.jacobians)
-        return abs(float(moved[0]))
+        again = ConditionSearch(condition, self._on_line, point.cycle.orbits, place, tight, point.jacobians)
+        return abs(float(again.moved()[0]))
 
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None

@@ -16,7 +16,7 @@ from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import ALONG, Bifurcation, LocatedPoint, met
+from friso.hunting.boundary.locate import ALONG, Bifurcation, LocatedPoint, met, met_by_secants
 from friso.hunting.boundary.settings import ContinuationSettings
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
@@ -114,11 +114,12 @@ class CurveTracer:
         special, size, states = near.special, near.size, near.special.point.cycle.states
         if expected is not None:
             size, states = expected.size, expected.states
-        direction, far, slope = ALONG, reach, self._slope(near, across, expected)
+        direction, far = ALONG, reach
         if self.kind == "fold":
             direction, far = special.direction * [0.0, 1.0, 1.0], ContinuationSettings.current().fold_search_depth
             direction = direction / np.linalg.norm(direction)
-        located = met(tracer, special, np.concatenate([[0.0], size]), direction, far, states, slope)
+        search = (tracer, special, np.concatenate([[0.0], size]), direction, far, states)
+        located = met_by_secants(*search, self._slope(near, across, expected)) if tracer.chatters else met(*search)
         if located is None or abs(located.point.place) > reach:
             return None
         return Spot(origin + located.point.place * across, located, across)

@@ -268,24 +268,20 @@ def met(
     direction: np.ndarray,
     reach: float,
     states: np.ndarray,
-    slope: float,
 ) -> LocatedPoint | None:
     """Find a special point on a line of keys, from the one `near` it.
 
     Newton's method solves for the orbit and its multiplier together. `origin`, the guess, and `direction`, both (3,),
     are in the space of place (0 to 1 along the line), log distance and log time. `states`, shape (1, states), lie near
-    the orbit. Where a limiter chatters, `slope` is about the change of the multiplier along the direction. Returns None
-    if there is no such point within `reach` of the origin along the direction.
+    the orbit. Returns None if there is no such point within `reach` of the origin along the direction.
     """
-    if tracer.chatters:
-        return _met_by_secants(tracer, near, origin, direction, reach, states, slope)
     point = tracer.meet(_at(near.kind), origin, direction, states, near.point)
     if point is None or abs(float((point.vector - origin) @ direction)) > reach:
         return None
     return LocatedPoint(near.kind, point, direction, tracer.shift(_at(near.kind), point))
 
 
-def _met_by_secants(
+def met_by_secants(
     tracer: Tracer,
     near: LocatedPoint,
     origin: np.ndarray,
@@ -296,7 +292,8 @@ def _met_by_secants(
 ) -> LocatedPoint | None:
     """Find a special point as `met` does, where a limiter chatters and multipliers scatter.
 
-    The secant method closes an orbit for every trial of the place, and ends where the scatter begins.
+    The secant method closes an orbit for every trial of the place, and ends where the scatter begins. `slope` is about
+    the change of the multiplier along the direction.
     """
     settings, kind = ContinuationSettings.current(), near.kind
     last_step = _last_step(tracer, kind, float(origin[0]))

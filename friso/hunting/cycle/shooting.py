@@ -162,45 +162,6 @@ def close_along(
     return Followed(replace(orbits, swings=swings or orbits.swings), following.best_places, following.best_jacobians)
 
 
-def close_where(
-    condition: Condition,
-    family: Family,
-    orbits: Orbits,
-    places: np.ndarray,
-    rtol: float,
-    jacobians: np.ndarray | None = None,
-) -> Followed:
-    """Close orbits while their stages move along lines of keys, until each meets a condition as well.
-
-    Newton's method solves for orbit, time and place together. It starts from approximate `orbits` and `places`, with
-    `jacobians` of orbits that meet the condition nearby, if known. Runs have the relative tolerance `rtol`.
-    """
-    meeting = _iterated(_Meeting(condition, family, orbits, places, rtol, jacobians))
-    closed = replace(meeting.orbits, swings=orbits.swings)
-    return Followed(closed, meeting.best_places, meeting.best_jacobians)
-
-
-def moved_by(
-    condition: Condition,
-    family: Family,
-    orbits: Orbits,
-    places: np.ndarray,
-    rtol: float,
-    jacobians: np.ndarray | None = None,
-) -> np.ndarray:
-    """Return how far the places at which orbits meet a condition move at another tolerance, (count,).
-
-    Two Newton steps at the relative tolerance `rtol` lead from the `orbits` and `places` of `close_where` to the new
-    ones; the second corrects the first. The result is infinite where a run fails, or the orbit is not yet closed. The
-    other arguments are those of that function.
-    """
-    meeting = _Meeting(condition, family, orbits, places, rtol, jacobians)
-    meeting.advance()
-    meeting.advance()
-    near = (meeting.gaps < OrbitSettings.current().fresh_jacobian_gap) & np.isfinite(meeting.places)
-    return np.where(near, meeting.places - places, np.inf)
-
-
 _S = TypeVar("_S", bound="_Shooting")
 
 
@@ -451,11 +412,13 @@ class _Following(_Shooting):
         return np.hstack([super()._residual(which, stages), residual[:, None]])
 
 
-class _Meeting(_Following):
+class ConditionSearch(_Following):
     """Orbits on lines of keys, each followed to the place at which it meets a condition.
 
-    The last row of a Jacobian has the derivatives of the condition along the branch of closed orbits. Across it, where
-    orbits are not closed, they are only learnt from the steps.
+    Newton's method solves for orbit, time and place together. It starts from approximate `orbits` and `places`, with
+    `jacobians` of orbits that meet the condition nearby, if known. Runs have the relative tolerance `rtol`. The last
+    row of a Jacobian has the derivatives of the condition along the branch of closed orbits. Across it, where orbits
+    are not closed, they are only learnt from the steps.
     """
 
     def __init__(
@@ -465,16 +428,32 @@ class _Meeting(_Following):
         orbits: Orbits,
         places: np.ndarray,
         rtol: float,
-        jacobians: np.ndarray | None,
+        jacobians: np.ndarray | None = None,
     ) -> None:
         super().__init__(family, orbits.states, orbits.times, orbits.sign, rtol, places)
         tolerances = ToleranceSettings.current()
-        self.condition = condition
+        self.condition, self.swings = condition, orbits.swings
         self.limit, self.finest = tolerances.closed_gap, tolerances.gap_rtol_factor * tolerances.closed_gap
         if jacobians is not None:
             self.jacobians = jacobians.copy()
             self.inverses = [_inverse(jacobian) for jacobian in jacobians]
             self.serves[:] = True
+
+    def closed(self) -> Followed:
+        """Return the orbits closed where they meet the condition, with their places and Jacobians."""
+        orbits = _iterated(self).orbits
+        return Followed(replace(orbits, swings=self.swings), self.best_places, self.best_jacobians)
+
+    def moved(self) -> np.ndarray:
+        """Return how far two Newton steps move the places, (count,), from orbits closed at another tolerance.
+
+        The second step corrects the first. The result is infinite where a run fails, or the orbit is not yet closed.
+        """
+        before = self.places.copy()
+        self.advance()
+        self.advance()
+        near = (self.gaps < OrbitSettings.current().fresh_jacobian_gap) & np.isfinite(self.places)
+        return np.where(near, self.places - before, np.inf)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
         """Leave the last row of Jacobians, which belongs to the condition."""
