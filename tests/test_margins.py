@@ -177,10 +177,10 @@ def test_a_window_that_was_searched_is_not_forgotten() -> None:
         "surveyed_roughly": lambda stages, close: answers(stages),
         "what_attracts": answers,
         "surely_surveyed": lambda stages, survey: survey.decided,
+        "Ensemble": SimpleNamespace(held=lambda factors, count: factors),
     }
-    with patched({module: changed}), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module._Side, "_stages", lambda side, factors: factors)
-        margin = parameter_margin(lambda factors: {}, False, 1 / 3, 3.0)
+    with patched({module: changed}):
+        margin = parameter_margin(lambda factors: factors, False, 1 / 3, 3.0)  # type: ignore[arg-type,return-value]
     assert margin.below is not None
     assert 0.8 < margin.below.other < 0.9 < margin.below.same
     assert margin.below.certain

@@ -244,11 +244,13 @@ class EdgeSearch:
         at, stages = last.cycle.orbits, self._stages(np.array([beyond]))
         if stages.chatters:
             return ()
+        states, times = at.states, at.times
         for factor in np.geomspace(end, beyond, EdgeSettings.current().past_end_steps + 1)[1:]:
             there = self._stages(np.array([factor]))
-            before, at = at, close(there, at.states, at.times, at.sign, RTOL, at.swings)
+            before, at = at, close(there, states, times, at.sign, RTOL, at.swings)
             if not (at.closed & kept(there, at, before.states[:, stages.sticking]))[0]:
                 return ()
+            states, times = 2 * at.states - before.states, 2 * at.times - before.times
         return tuple(of_cycles(np.zeros(1, np.int64), described(stages, at, RTOL), stages.sticking))
 
     def _stages(self, factors: np.ndarray) -> Ensemble:

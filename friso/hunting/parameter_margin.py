@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
+from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
@@ -72,29 +75,86 @@ class ParameterMargin:
         return self.below if side < 0 else self.above
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """Factors of a parameter, shape (count,), to be surveyed roughly, or searched thoroughly."""
+
+    factors: np.ndarray
+    thorough: bool
+
+
+@dataclass(frozen=True)
+class _Found(ArrayRows):
+    """What surveys show of stages, arrays of shape (count,).
+
+    A stage `attracts` or not, which is `decided` or not. `certain` results come from a closed orbit or a completed
+    thorough search.
+    """
+
+    attracts: np.ndarray
+    decided: np.ndarray
+    certain: np.ndarray
+
+
+_Search = Generator[_Wanted, _Found, MarginEnd | None]
+"""Search for an end of a margin, which asks for surveys and is sent their results."""
+
+
 def parameter_margin(scaled: Scaled, attracts: bool, lowest: float, highest: float) -> ParameterMargin:
     """Find over what range of a parameter a stage keeps hunting, or keeps not hunting.
 
     The search runs from the factor `lowest` to the `highest` one. `scaled` makes the stages, and `attracts` is true if
     the stage itself hunts. Each side is surveyed roughly, at values whose spacing grows outward, then more closely
-    around a change. Both ends are searched thoroughly. Ranges narrower than these steps may be missed. A side is open
-    if an allowance of work is used up, or the search does not decide.
+    around a change. Both ends are searched thoroughly, side by side. Ranges narrower than these steps may be missed. A
+    side is open if an allowance of work is used up, or the search does not decide.
     """
-    settings = EdgeSettings.current()
-    ends: dict[int, MarginEnd | None] = {-1: None, 1: None}
-    open_sides = []
-    for side, farthest in ((-1, lowest), (1, highest)):
-        if side * (farthest - 1) <= settings.widest_factor_step:
-            continue
-        try:
-            ends[side] = _Side(scaled, attracts, farthest).end()
-        except (Exhausted, Undecided):
-            open_sides.append(side)
-    searched = (
-        lowest if lowest < 1 - settings.widest_factor_step else 1.0,
-        highest if highest > 1 + settings.widest_factor_step else 1.0,
+    step = EdgeSettings.current().widest_factor_step
+    farthest = {side: at for side, at in ((-1, lowest), (1, highest)) if side * (at - 1) > step}
+    searches = {side: _Side(attracts, at).end() for side, at in farthest.items()}
+    ends, open_sides = _ends(scaled, searches)
+    return ParameterMargin(
+        attracts, ends.get(-1), ends.get(1), (farthest.get(-1, 1.0), farthest.get(1, 1.0)), open_sides
     )
-    return ParameterMargin(attracts, ends[-1], ends[1], searched, tuple(open_sides))
+
+
+def _ends(scaled: Scaled, searches: dict[int, _Search]) -> tuple[dict[int, MarginEnd | None], tuple[int, ...]]:
+    """Run searches side by side, and return the ends they find, by side, and the sides that stay open.
+
+    Surveys of one kind that several searches wait for are made together; rough ones come first.
+    """
+    ends: dict[int, MarginEnd | None] = {}
+    wanted = dict.fromkeys(searches, _Wanted(np.empty(0), False))
+    answers: dict[int, Any] = dict.fromkeys(searches)
+    with suppress(Exhausted):
+        while wanted:
+            for side, answer in answers.items():
+                try:
+                    wanted[side] = searches[side].send(answer)
+                except StopIteration as finished:
+                    ends[side] = finished.value
+                    del wanted[side]
+                except Undecided:
+                    del wanted[side]
+            thorough = all(one.thorough for one in wanted.values())
+            now = [side for side, one in wanted.items() if one.thorough == thorough]
+            if now:
+                found = _surveyed(scaled, np.concatenate([wanted[side].factors for side in now]), thorough)
+                places = np.cumsum([0, *(len(wanted[side].factors) for side in now)])
+                answers = {side: found.take(slice(*part)) for side, part in zip(now, pairwise(places), strict=True)}
+    return ends, tuple(side for side in searches if side not in ends)
+
+
+def _surveyed(scaled: Scaled, factors: np.ndarray, thorough: bool) -> _Found:
+    """Survey the stages that `scaled` makes at factors of the parameter, roughly or thoroughly."""
+    stages = Ensemble.held(scaled(factors), len(factors))
+    if not thorough:
+        roughly = surveyed_roughly(stages, close=False)
+        return _Found(roughly.attracts, roughly.decided, np.zeros(len(factors), bool))
+    survey = what_attracts(stages)
+    closed = np.zeros(len(factors), bool)
+    closed[[motion.stage for motion in survey.motions if motion.cycles is not None]] = True
+    surely = surely_surveyed(stages, survey)
+    return _Found(survey.attracts, surely, np.where(survey.attracts, closed, surely))
 
 
 class _Side:
@@ -104,27 +164,22 @@ class _Side:
     thoroughly. `certain`: the thorough search was certain.
     """
 
-    def __init__(self, scaled: Scaled, attracts: bool, farthest: float) -> None:
-        """Survey some factors roughly, from 1 to the `farthest`.
-
-        `scaled` makes the stages, and `attracts` is true if the stage itself hunts. Raises Exhausted if an allowance of
-        work is used up.
-        """
-        self.scaled, self.attracts = scaled, attracts
+    def __init__(self, attracts: bool, farthest: float) -> None:
+        """Begin at the factor 1; `attracts` is true if the stage itself hunts, and `farthest` is the last factor."""
+        self.attracts, self.farthest = attracts, farthest
         self.factors, self.changed = np.ones(1), np.zeros(1, bool)
         self.decided, self.searched, self.certain = (np.ones(1, bool) for _ in range(3))
-        self._try(farthest**SHARES)
 
-    def end(self) -> MarginEnd | None:
+    def end(self) -> _Search:
         """Find the first factor at which hunting begins or ends; None if there is none.
 
-        Raises Exhausted if an allowance of work is used up, and Undecided if surveys leave open whether hunting
-        changes.
+        Raises Undecided if surveys leave open whether hunting changes.
         """
+        yield from self._try(self.farthest**SHARES)
         for _ in range(EdgeSettings.current().most_proofs):
-            first = self._bracketed()
-            pair = WITHIN if first is None else self._pair(first)
-            self._search(pair[~self.searched[pair]])
+            first = yield from self._bracketed()
+            pair = WITHIN if first is None else (yield from self._pair(first))
+            yield from self._search(pair[~self.searched[pair]])
             if first is None and not self.changed.any():
                 if not self.decided.all():
                     raise Undecided
@@ -138,7 +193,7 @@ class _Side:
                 self.changed[: pair[1]] &= self.searched[: pair[1]]
         raise Undecided
 
-    def _bracketed(self) -> int | None:
+    def _bracketed(self) -> Generator[_Wanted, _Found, int | None]:
         """Find the first factor at which hunting has changed; return its number, or None.
 
         Factors before it are tried until the last one without a change is close.
@@ -148,18 +203,11 @@ class _Side:
             first = int(changed[0])
             if abs(self.factors[first] / self.factors[first - 1] - 1) <= settings.widest_factor_step:
                 return first
-            self._try(self._finer(first))
+            between = np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
+            yield from self._try(between)
         return None
 
-    def _finer(self, first: int) -> np.ndarray:
-        """Return factors to try between the factor numbered `first` and the one before.
-
-        Hunting has changed at the factor `first`, and has not at the one before.
-        """
-        settings = EdgeSettings.current()
-        return np.geomspace(self.factors[first - 1], self.factors[first], settings.bracket_steps + 1)[1:-1]
-
-    def _pair(self, first: int) -> np.ndarray:
+    def _pair(self, first: int) -> Generator[_Wanted, _Found, np.ndarray]:
         """Choose two factors, by number, to search thoroughly around the first change.
 
         Their distances from the change are `proved_distances`: close to the end of hunting, motions take long to decay,
@@ -167,34 +215,28 @@ class _Side:
         """
         settings = EdgeSettings.current()
         inward, outward = settings.proved_distances if self.attracts else settings.proved_distances[::-1]
-        places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.factors[-1]))
+        places, farthest = np.abs(np.log(self.factors)), abs(np.log(self.farthest))
         wanted = np.clip([places[first - 1] - inward, places[first] + outward], 0.0, farthest)
         new = [place for place in wanted if np.abs(places - place).min() > settings.same_factor_log]
         if new:
-            self._try(np.exp(np.sign(np.log(self.factors[-1])) * np.array(new)))
+            yield from self._try(np.exp(np.sign(np.log(self.farthest)) * np.array(new)))
         places = np.abs(np.log(self.factors))
         return np.array([np.abs(places - place).argmin() for place in wanted])
 
-    def _try(self, factors: np.ndarray) -> None:
+    def _try(self, factors: np.ndarray) -> Generator[_Wanted, _Found, None]:
         """Survey more factors roughly."""
-        survey = surveyed_roughly(self._stages(factors), close=False)
+        found = yield _Wanted(factors, thorough=False)
         order = np.argsort(np.abs(np.log(np.append(self.factors, factors))), kind="stable")
         self.factors = np.append(self.factors, factors)[order]
-        self.changed = np.append(self.changed, survey.attracts != self.attracts)[order]
-        self.decided = np.append(self.decided, survey.decided)[order]
+        self.changed = np.append(self.changed, found.attracts != self.attracts)[order]
+        self.decided = np.append(self.decided, found.decided)[order]
         nothing = np.zeros(len(factors), bool)
         self.searched, self.certain = (np.append(flags, nothing)[order] for flags in (self.searched, self.certain))
 
-    def _search(self, numbers: np.ndarray) -> None:
+    def _search(self, numbers: np.ndarray) -> Generator[_Wanted, _Found, None]:
         """Search factors thoroughly, by number."""
-        stages = self._stages(self.factors[numbers])
-        survey = what_attracts(stages)
-        closed = np.zeros(len(numbers), bool)
-        closed[[motion.stage for motion in survey.motions if motion.cycles is not None]] = True
-        self.changed[numbers], self.searched[numbers] = survey.attracts != self.attracts, True
-        self.decided[numbers] = surely = surely_surveyed(stages, survey)
-        self.certain[numbers] = np.where(survey.attracts, closed, surely)
-
-    def _stages(self, factors: np.ndarray) -> Ensemble:
-        """Return the stage with its parameter multiplied by factors."""
-        return Ensemble.held(self.scaled(factors), len(factors))
+        if not numbers.size:
+            return
+        found = yield _Wanted(self.factors[numbers], thorough=True)
+        self.changed[numbers], self.searched[numbers] = found.attracts != self.attracts, True
+        self.decided[numbers], self.certain[numbers] = found.decided, found.certain

@@ -129,7 +129,7 @@ class EdgeSettings(Settings):
     beyond_edge_factor: float = setting(1.0095, "")
     """First factor beyond an edge at which no attractor may exist. It makes the edge accurate to one per cent."""
 
-    past_end_steps: int = setting(8, "")
+    past_end_steps: int = setting(4, "")
     """Steps in which an orbit is followed from its end to that factor, in case it is stable again there. In fewer steps
     Newton's method finds another orbit."""
 
