@@ -54,6 +54,30 @@ def test_a_map_with_a_slope_below_1_is_drawn_to_its_fixed_point(slope: float, fi
         assert set(within) <= set(attractor.basin)
 
 
+@settings(deadline=None, max_examples=40)
+@given(st.integers(0, 10**9), st.booleans())
+def test_the_cycle_to_which_straight_pieces_lead_is_that_of_many_landings(seed: int, symmetric: bool) -> None:
+    """Slow twin: the map iterated 4000 times from every point that is moved to a cycle at once."""
+    rng = np.random.default_rng(seed)
+    before = np.sort(np.exp(rng.uniform(-4, 1, 40)))
+    after = before * np.exp(np.cumsum(rng.normal(0, 0.1, 40)))
+    if not symmetric:
+        before, after = (
+            np.concatenate([-before[::-1], before]),
+            np.concatenate([after[::-1], -after * rng.uniform(0.9, 1.1)]),
+        )
+    count = len(before)
+    drawn = LandingMap(before, after, np.arange(count), np.ones(count, bool), symmetric, 0)
+    at = drawn._places(before)
+    cycles = drawn._on_cycles(at)
+    moved = cycles != at
+    apart = np.abs(cycles - at)[moved]
+    for _ in range(4000):
+        at = drawn.next(at)
+    assert np.all(np.abs(at - cycles)[moved] <= 1e-9 + 0.02 * apart)
+    assert drawn.next(drawn.next(cycles[moved])) == pytest.approx(cycles[moved], abs=1e-9)
+
+
 @settings(deadline=None)
 @given(st.floats(0.05, 0.99))
 def test_a_stage_that_always_lands_nearer_comes_to_rest(gain: float) -> None:

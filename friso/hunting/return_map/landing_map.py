@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -110,54 +109,63 @@ class LandingMap:
         each half has the gain of the nearer point.
         """
         settings = ReturnMapSettings.current()
-        begins, values, slopes = [-np.inf], [REST], [0.0]
-
-        def piece(begin: float, value: float, slope: float) -> None:
-            begins.append(begin)
-            values.append(value)
-            slopes.append(slope)
-
-        def beside(begin: float, at: float, after: float) -> None:
-            if np.isfinite(after) and after != 0:
-                piece(begin, float(_place(np.array(after))) - at, 1.0)
-            else:
-                piece(begin, REST, 0.0)
-
+        lines = [np.array([[-np.inf], [REST], [0.0]])]
         for side in self.sides:
             points = self.points(side)
             places, after = _place(self.before[points]), self.after[points]
-            first = len(begins)
-            for k, (low, high) in enumerate(pairwise(places.tolist())):
-                if high <= low:
-                    continue
-                one, two = after[k], after[k + 1]
-                if np.isfinite(one) and np.isfinite(two) and one * two > 0:
-                    rise = np.log(two / one)
-                    if abs(rise) < settings.break_jump_log + settings.break_steepness * (high - low):
-                        slope = rise / (high - low)
-                        piece(low, float(_place(np.array(one))) - slope * low, slope)
-                        continue
-                beside(low, low, one)
-                beside((low + high) / 2, high, two)
-            # the first line continues a little nearer to home
-            if len(points) and first < len(begins) and begins[first] == places[0]:
-                begins[first] -= settings.scatter_range_log
+            k = np.flatnonzero(np.diff(places) > 0)
+            low, high, one, two = places[k], places[k + 1], after[k], after[k + 1]
+            with np.errstate(all="ignore"):
+                slope = np.log(two / one) / (high - low)
+                joined = (one * two > 0) & (
+                    np.abs(slope) < settings.break_jump_log / (high - low) + settings.break_steepness
+                )
+            broken = ~joined
+            pieces = np.array([low, *_beside(low, one)])
+            pieces[1:, joined] = _place(one[joined]) - slope[joined] * low[joined], slope[joined]
+            middle = (low + high)[broken] / 2
+            pieces = np.hstack([pieces, [middle, *_beside(high[broken], two[broken])]])
+            pieces = pieces[:, np.argsort(pieces[0], kind="stable")]
+            if k.size and k[0] == 0:
+                pieces[0, 0] -= settings.scatter_range_log  # the first line continues a little nearer to home
             if len(points):
-                beside(places[-1], places[-1], after[-1] if abs(after[-1]) < abs(self.before[points[-1]]) else 0.0)
-            piece(OTHER_SIDE / 2 if side > 0 else np.inf, REST, 0.0)
-        return np.array(begins), np.array(values), np.array(slopes)
+                ends = after[-1:] if abs(after[-1]) < abs(self.before[points[-1]]) else np.zeros(1)
+                pieces = np.hstack([pieces, [places[-1:], *_beside(places[-1:], ends)]])
+            lines += [pieces, np.array([[OTHER_SIDE / 2 if side > 0 else np.inf], [REST], [0.0]])]
+        begins, values, slopes = np.hstack(lines)
+        return begins, values, slopes
 
     def next(self, places: np.ndarray) -> np.ndarray:
         """Return the coordinates of the landings that follow landings at `places`, both (count,).
 
         Coordinates are logarithms of distance (see `_place`), between which the map is interpolated.
         """
-        begins, values, slopes = self._lines
-        pieces = begins.searchsorted(places, side="right") - 1
+        _, values, slopes = self._lines
+        pieces = self._pieces(places)
         after = values[pieces] + slopes[pieces] * places
         near = self._nearest
         after[(after < near) | ((after > OTHER_SIDE / 2) & (after < OTHER_SIDE + near))] = REST
         return after
+
+    def _pieces(self, places: np.ndarray) -> np.ndarray:
+        """Return the numbers of the straight pieces on which coordinates lie, both (count,)."""
+        return self._lines[0].searchsorted(places, side="right") - 1
+
+    def _on_cycles(self, at: np.ndarray) -> np.ndarray:
+        """Move coordinates to the cycles of one or two landings that they approach; leave others as they are.
+
+        Two straight pieces that lead back to the first make one straight line, whose fixed point is the cycle. If this
+        line is less steep than the diagonal, and coordinate and cycle lie on the same pieces, iterating the map leads
+        to the cycle as well, but slowly.
+        """
+        _, values, slopes = self._lines
+        first, after = self._pieces(at), self.next(at)
+        second = self._pieces(after)
+        slope, offset = slopes[first] * slopes[second], values[second] + slopes[second] * values[first]
+        attracts = (slope >= 0) & (slope < 1) & (first > 0) & (self._pieces(self.next(after)) == first)
+        cycle = offset / np.where(attracts, 1 - slope, 1.0)
+        attracts &= (self._pieces(cycle) == first) & (self._pieces(self.next(cycle)) == second)
+        return np.where(attracts, cycle, at)
 
     @cached_property
     def _nearest(self) -> float:
@@ -183,6 +191,7 @@ class LandingMap:
             earlier = np.full(len(at), np.inf)
             for number in range(iterations):
                 if number % settings.checked_landings == 0:
+                    at = self._on_cycles(at)
                     if np.all((np.abs(at - earlier) < settings.exact_repetition_share) | (at <= REST)):
                         break
                     earlier = at
@@ -243,8 +252,7 @@ class LandingMap:
         """
         if not attractor.periodic:
             return np.inf
-        begins, _, slopes = self._lines
-        return float(np.abs(np.prod(slopes[np.searchsorted(begins, self._places(attractor.distances), "right") - 1])))
+        return float(np.abs(np.prod(self._lines[2][self._pieces(self._places(attractor.distances))])))
 
     @property
     def scatter(self) -> tuple[float, float]:
@@ -285,6 +293,16 @@ def _distance(places: np.ndarray) -> np.ndarray:
     """Return signed distances from coordinates on the map (see `_place`)."""
     negative = places > OTHER_SIDE / 2
     return np.where(negative, -1.0, 1.0) * np.exp(np.where(negative, places - OTHER_SIDE, places))
+
+
+def _beside(at: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return values at 0 and slopes of straight pieces that have the gain of one point each, both (points,).
+
+    A point has the coordinate `at` on the map (see `_place`), and the next landing at the signed distance `after`. If
+    the stage rests or diverges after it, the piece leads to rest.
+    """
+    goes = np.isfinite(after) & (after != 0)
+    return np.where(goes, _place(np.where(goes, after, 1.0)) - at, REST), np.where(goes, 1.0, 0.0)
 
 
 def _without_excursions(distances: np.ndarray, count: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
