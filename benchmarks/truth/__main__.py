@@ -27,7 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
 from benchmarks.truth.attack import attack
 from benchmarks.truth.by_hand import NotWritten
 from benchmarks.truth.draws import SERIES, draw
-from benchmarks.truth.kept import KeptAttacks, Record, is_current
+from benchmarks.truth.kept import KeptAttacks, Record, dated, is_current
 from benchmarks.truth.positions import compared, summary
 from benchmarks.truth.tally import document, page, print_tally
 from friso.engine.kernel import kernels
@@ -48,7 +48,7 @@ def main() -> None:
         records = [*kept.records.values()]
     elif arguments.checks:
         records = []
-        _attack_all(arguments, numbers, records.append)
+        _attack_all(arguments, numbers, lambda record: records.append(dated(record)))
     else:
         there = {r["number"] for r in kept.of(arguments.series, arguments.seed, numbers) if _stays(r, arguments.redo)}
         _attack_all(arguments, [number for number in numbers if number not in there], kept.add)

@@ -61,7 +61,7 @@ class KeptAttacks:
 
     def add(self, record: Record) -> Record:
         """Append an attack to the file, with code version and day; it is on disk on return."""
-        record = record | {"code": code_version(), "day": date.today().isoformat()}
+        record = dated(record)
         self.file.parent.mkdir(parents=True, exist_ok=True)
         with self.file.open("ab+", buffering=0) as stream:
             stream.seek(max(stream.seek(0, os.SEEK_END) - 1, 0))
@@ -75,6 +75,11 @@ class KeptAttacks:
         """Return the attacks on numbered stages."""
         keys = [(series, seed, number) for number in numbers]
         return [self.records[key] for key in keys if key in self.records]
+
+
+def dated(record: Record) -> Record:
+    """Return a record with the version of the present code and the day."""
+    return record | {"code": code_version(), "day": date.today().isoformat()}
 
 
 def is_current(record: Record) -> bool:
