@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from variants import VARIANTS
 
-from friso.engine.allowance import PER_BATCH, Exhausted, allowance
+from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import CALL, OPERATION, STEP, kernel
+from friso.engine.settings import WorkSettings
 from friso.equations.structure import structure
 from friso.hunting import CheckPart
 from friso.hunting.measures import measured_run
@@ -44,7 +45,7 @@ def test_work_is_counted_alike_on_every_processor(locked: Stage) -> None:
     work = kernel(structure(locked.flat())).work
     with allowance() as single:
         (steps,) = runs_of(locked, 1)
-    assert single.used == PER_BATCH + 8 * work * steps
+    assert single.used == WorkSettings().batch_work + 8 * work * steps
 
 
 def test_a_step_is_as_dear_as_the_operations_in_it() -> None:

@@ -50,6 +50,7 @@ from friso.axis import LINEAR
 from friso.engine import building
 from friso.engine.cache import CodeRequest
 from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first, is_first
+from friso.engine.settings import BuildSettings
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
 from friso.interface.schema import stage_schema
@@ -1085,9 +1086,8 @@ def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> N
     assert np.array_equal(friso.simulate(STICK_SLIP)["position"].values, before)
 
 
-def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_other_work_waits_at_its_next_batch_while_something_goes_first() -> None:
     """The threads of the work that goes first do not wait, and nobody waits for slow work."""
-    monkeypatch.setattr("friso.engine.overtaken.AHEAD", 60.0)
     order = []
 
     def other() -> None:
@@ -1096,7 +1096,7 @@ def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monke
         order.append("other")
 
     begun = threading.Event()
-    with going_first(), local_crew() as crew:
+    with BuildSettings(priority_time=60.0).in_use(), going_first(), local_crew() as crew:
         thread = threading.Thread(target=other)
         thread.start()
         begun.wait(60)
@@ -1105,8 +1105,7 @@ def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monke
         order.append("first")
     thread.join()
     assert order == ["first", "other"]
-    monkeypatch.setattr("friso.engine.overtaken.AHEAD", 0.0)
-    with going_first():
+    with BuildSettings(priority_time=0.0).in_use(), going_first():
         thread = threading.Thread(target=other)
         thread.start()
         thread.join()

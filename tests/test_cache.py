@@ -19,8 +19,8 @@ from systems import posix
 
 from friso.engine import building, cache, private, prune
 from friso.engine.cache import DAY
-from friso.engine.prune import KEPT_FOR
 from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
+from friso.engine.settings import BuildSettings
 from friso.platform.helper_process import HelperProcess
 from friso.platform.whole_file import PARTIAL
 
@@ -186,7 +186,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
     """When something else is built; and requests for it with it."""
     (old,) = entries(copied)
     (request,) = (copied / "kernels").glob("*.request")
-    aged(KEPT_FOR + DAY, old, request)
+    aged(BuildSettings().kept_time + DAY, old, request)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not old.exists()
     assert not request.exists()
@@ -197,30 +197,30 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
 def test_what_is_used_is_kept(copied: Path) -> None:
     """An entry that was built long ago stays too, because its use is recorded."""
     (old,) = entries(copied)
-    aged(KEPT_FOR + DAY, old, *(copied / "kernels").glob("*.request"))
+    aged(BuildSettings().kept_time + DAY, old, *(copied / "kernels").glob("*.request"))
     assert not built(copied)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not built(copied)
 
 
-def test_there_is_an_end_to_what_is_kept(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_there_is_an_end_to_what_is_kept(copied: Path) -> None:
     """Entries unused for longest go first; entries used today stay."""
     first, folder = entry(copied), copied / "kernels"
     others = [Path(shutil.copy(first, first.with_name(f"{i}" * 24 + ".kernel"))) for i in range(1, 4)]
     size = first.stat().st_size
     for i, other in enumerate(others, 1):
         aged(i * 2 * DAY, other)
-    monkeypatch.setattr(prune, "KEPT_IN_ALL", 2.5 * size)
-    prune.prune(folder)
+    with BuildSettings(kept_size=int(2.5 * size)).in_use():
+        prune.prune(folder)
     assert set(entries(copied)) == {first, others[0]}
-    monkeypatch.setattr(prune, "KEPT_IN_ALL", 0)
-    prune.prune(folder)
+    with BuildSettings(kept_size=0).in_use():
+        prune.prune(folder)
     assert entries(copied) == [first]
 
 
 def test_an_entry_that_is_being_written_is_left_alone(copied: Path) -> None:
     old = entry(copied)
-    aged(KEPT_FOR + DAY, old)
+    aged(BuildSettings().kept_time + DAY, old)
     with cache.entry_lock(old):
         prune.prune(copied / "kernels")
         assert old.exists()

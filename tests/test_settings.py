@@ -16,7 +16,7 @@ LITERALS = {
     "friso/cli": 8,
     "friso/design_method": 3,
     "friso/drives": 10,
-    "friso/engine": 49,
+    "friso/engine": 22,
     "friso/equations": 27,
     "friso/frequency": 10,
     "friso/hunting": 11,

@@ -13,15 +13,7 @@ from typing import NoReturn
 
 import numpy as np
 
-PER_BATCH = 1e5
-"""Work to prepare a batch of runs."""
-
-COUNTED_LANES = 8
-"""Number of runs that count as computed side by side, whatever the processor. A processor with fewer lanes takes
-longer, but stops at equal work."""
-
-FAIR = 2.0
-"""Largest part of the remaining work for each of several runs, in units of an equal part."""
+from friso.engine.settings import WorkSettings
 
 
 class Exhausted(Exception):
@@ -52,10 +44,10 @@ class Allowance:
 
         Raises Exhausted if nothing is left.
         """
-        left = self.left
+        settings, left = WorkSettings.current(), self.left
         if left <= 0:
             self.exhaust()
-        return left / step * min(1 / COUNTED_LANES, FAIR / runs)
+        return left / step * min(1 / settings.counted_lanes, settings.fair_share_factor / runs)
 
     def exhaust(self) -> NoReturn:
         """Raise Exhausted, because the allowance, or one around it, does not suffice."""
@@ -71,7 +63,9 @@ class Allowance:
 
         A single run counts as much as eight, because eight are computed side by side.
         """
-        work = PER_BATCH + step * max(float(np.sum(steps)), COUNTED_LANES * float(np.max(steps, initial=0.0)))
+        settings = WorkSettings.current()
+        longest = settings.counted_lanes * float(np.max(steps, initial=0.0))
+        work = settings.batch_work + step * max(float(np.sum(steps)), longest)
         at: Allowance | None = self
         while at is not None:
             at.used += work

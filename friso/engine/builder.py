@@ -11,15 +11,13 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+from friso.engine.settings import BuildSettings
 from friso.platform.helper_process import answer_questions
-
-GARBAGE = 100_000, 50, 100
-"""Thresholds of the garbage collector. With the usual ones collection takes a tenth of the time."""
 
 
 def main(folder: Path) -> None:
     """Compile the requests that arrive, into a folder of the cache."""
-    gc.set_threshold(*GARBAGE)
+    gc.set_threshold(*BuildSettings.current().builder_garbage_thresholds)
 
     def built(asked: tuple[str, bytes]) -> str | OSError:
         """Build one request; return the name of its entry, or the error that prevented it."""

@@ -10,12 +10,7 @@ import numpy as np
 
 from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results
-
-BUDGET = 200
-"""Steps that a run may take per sample on average."""
-
-CHUNK, FEWEST, MOST = 4e6, 16, 256
-"""Samples of all runs in a chunk, limited by memory; fewest and most runs of a chunk."""
+from friso.engine.settings import RoomSettings
 
 
 @dataclass(frozen=True)
@@ -76,10 +71,13 @@ def run_driven(
     shape (runs, kept). The states of a failed run are NaN from the failure on, and the run has its status.
     """
     count, shared = len(inputs.reference), inputs.segments if np.ndim(inputs.force) == 1 else None
-    options = RunOptions(rtol=rtol, bands=(0.0, 0.0), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
+    room = RoomSettings.current()
+    options = RunOptions(
+        rtol=rtol, bands=(0.0, 0.0), record_from=np.inf, least_swing=np.inf, budget=room.driven_steps_per_sample * count
+    )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = options_of(replace(options, interval=inputs.sample_time))
-    at_once = int(np.clip(CHUNK / count, FEWEST, MOST))
+    at_once = int(np.clip(room.driven_samples / count, *room.driven_runs))
     for first in range(0, runs, at_once):
         numbers = np.arange(first, min(first + at_once, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])

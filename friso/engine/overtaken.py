@@ -14,6 +14,8 @@ from threading import Condition
 
 import numpy as np
 
+from friso.engine.settings import BuildSettings
+
 
 class Overtaken(BaseException):
     """Error: nobody waits for this work any more."""
@@ -57,10 +59,6 @@ def go_on() -> None:
         raise Overtaken
 
 
-AHEAD = 0.5
-"""Longest time [s] for which a question has priority. After that, nobody is still watching, and the compilation of its
-kernel must not keep others waiting."""
-
 _FIRST: ContextVar[bool] = ContextVar("first", default=False)
 _ahead: dict[object, float] = {}
 _turn = Condition()
@@ -71,7 +69,7 @@ def going_first() -> Iterator[None]:
     """Give priority to runs within the `with` block: other work waits at its next batch of runs."""
     token, own = _FIRST.set(True), object()
     with _turn:
-        _ahead[own] = time.monotonic() + AHEAD
+        _ahead[own] = time.monotonic() + BuildSettings.current().priority_time
     try:
         yield
     finally:

@@ -9,10 +9,8 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
+from friso.engine.settings import BuildSettings
 from friso.platform.whole_file import PARTIAL
-
-KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
-"""Time [s] after which unused code is deleted, and size [bytes] of the cache; code used within a day stays."""
 
 
 def prune(folder: Path) -> None:
@@ -22,12 +20,12 @@ def prune(folder: Path) -> None:
     """
     try:
         with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
-            size, now = 0, time.time()
+            size, now, settings = 0, time.time(), BuildSettings.current()
             for used, file, length in sorted(_used(folder), reverse=True):
                 size += length
                 age = now - used
                 unfinished = file.suffix == PARTIAL and age > DAY
-                if unfinished or age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
+                if unfinished or age > settings.kept_time or (age > DAY and size > settings.kept_size):
                     _delete(file)
     except (Timeout, OSError) as error:  # another process is pruning, too
         logger.debug("old kernels are left: %s", error)

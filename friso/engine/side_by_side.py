@@ -14,13 +14,11 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.engine.overtaken import ended_by, go_on
+from friso.engine.settings import BuildSettings
 from friso.platform.system import usable_cores
 
 _T = TypeVar("_T")
 _Other = TypeVar("_Other")
-
-_PATIENCE = 0.1
-"""Time [s] between checks that someone still waits for all results."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
     interrupts no wait on Windows.
     """
     while any(not job.done() for job in jobs):
-        for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
+        for job in wait(jobs, BuildSettings.current().waiting_interval, FIRST_EXCEPTION).done:
             job.result()
         go_on()
     return [job.result() for job in jobs]

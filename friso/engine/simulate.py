@@ -10,6 +10,7 @@ from friso.axis import axis_of
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import Kernel, kernel
+from friso.engine.settings import RoomSettings
 from friso.engine.tolerance import checked_rtol
 from friso.equations import motion
 from friso.equations.structure import structure
@@ -20,14 +21,8 @@ from friso.version import VERSION
 if TYPE_CHECKING:
     import xarray as xr
 
-SAMPLES = 20_000
-"""Default number of sampling intervals in a run."""
-
 RTOL = 1e-9
 """Default tolerance. A force limit that winds up, and contacts, multiply errors by up to 1e7."""
-
-MOST_SAMPLES = 20_000_000
-"""Most sampling intervals of a run, whose states and outputs take a few gigabytes."""
 
 
 def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
@@ -49,11 +44,16 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
     """
     flat = stage.flat()
     duration = flat["motion.duration"]
-    interval = duration / SAMPLES if sample_time is None else checked_interval(sample_time, duration)
+    interval = usual_interval(duration) if sample_time is None else checked_interval(sample_time, duration)
     shape = kernel(structure(flat))
     (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval
     return _dataset(stage, shape, flat, runs, time, rtol)
+
+
+def usual_interval(duration: float) -> float:
+    """Return the interval between samples [s] of a run of a duration [s] for which none is given."""
+    return duration / RoomSettings.current().samples_by_default
 
 
 def checked_interval(interval: float, duration: float) -> float:
@@ -61,8 +61,9 @@ def checked_interval(interval: float, duration: float) -> float:
 
     Raises InputError if the run would have too many samples, or none.
     """
-    if not duration / MOST_SAMPLES <= interval <= duration:
-        text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
+    least = duration / RoomSettings.current().most_samples
+    if not least <= interval <= duration:
+        text, expected = f"{interval:g} s", f"from {least:g} s to the duration, {duration:g} s"
         raise InputError("sample_time", text, expected, "1 ms")
     return interval
 

@@ -15,6 +15,7 @@ import sympy as sp
 from friso.engine.elimination import eliminate
 from friso.engine.layout import AXES, ROW, SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
+from friso.engine.settings import StepSettings
 from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
@@ -32,32 +33,6 @@ POINTS = ("near", "third", "far", "last")
 At a kink derivatives jump.
 """
 
-HYSTERESIS = 3e-3
-"""Distance beyond a kink, over the tolerance, at which it counts as crossed.
-
-A run that has crossed a kink is then clear of it, and rounding noise crosses nothing. At a kink derivatives jump.
-"""
-
-
-SAFETY = 0.77
-"""Factor on the step that the error estimate would allow. Larger values reject more steps than they save."""
-
-AFTER_KINK = 0.25
-"""Factor on the proposed step after a kink (where derivatives jump).
-
-Behind it the motion may be much faster.
-"""
-
-
-WIDE = 3.0
-"""Distance of a step's start from a kink, in widths of the narrow peak about the kink.
-
-A step from farther off may pass over the peak, because all of its stages may lie beyond. So such a step is repeated up
-to the kink if it crosses the kink and ends beyond the peak, or on this side again. At a kink derivatives jump.
-"""
-
-ROUNDING = 2e-15
-"""Least hysteresis over the terms of a surface, nine units in their last place."""
 
 UNCHANGED = ("stop", "start", "longest", "next_sample", "record_from", "turns", "last_kind")
 """Rows that the step does not change."""
@@ -65,14 +40,8 @@ UNCHANGED = ("stop", "start", "longest", "next_sample", "record_from", "turns", 
 UNWATCHED = ("old_time", "taken", "deviation_max", "deviation_min", "inner_exit", "outer_exit")
 """Rows that a model with a clock does not use, because its samples are examined instead."""
 
-NO_SWING = 1e-6
-"""Rate, over the velocity's tolerance, below which a deviation turns only by rounding."""
-
 INSIDE = "good & (entered | turned)"
 """Condition under which the loops around the step must look inside the step of a run."""
-
-DIVERGED = 1e6
-"""Deviation at which a run ends as diverged, in length scales of the motion."""
 
 
 class Block:
@@ -98,6 +67,7 @@ class StepWriter:
     """Writer of the code of one model's step, by one method."""
 
     def __init__(self, model: Model, tableau: Tableau) -> None:
+        self._settings = StepSettings.current()
         self.model, self.tableau = model, tableau
         self.size, self.kinks = len(model.states), len(model.kinks)
         self.constants = Constants(model.parameters)
@@ -397,6 +367,7 @@ class StepWriter:
         The code sets `fraction` to the fraction of the step at which it lies, or 1 if there is none. It sets `astray`
         to true if a run is on the other side of a kink than its mode says.
         """
+        clear, rounding = self._settings.kink_hysteresis, self._settings.surface_rounding
         lines = []
         for point, theta in enumerate(THIRDS):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
@@ -408,7 +379,7 @@ class StepWriter:
             points = zip(POINTS, ("s", "p0", "p1", "e"), strict=True)
             lines += [
                 f"side{k} = 2.0 * mode{k} - 1.0",
-                f"band{k} = {HYSTERESIS!r} * rtol * size{k}__s + {ROUNDING!r} * terms{k}__s",
+                f"band{k} = {clear!r} * rtol * size{k}__s + {rounding!r} * terms{k}__s",
             ]
             lines += [f"{point}{k} = side{k} * g{k}__{where} + band{k}" for point, where in points]
             lines += [
@@ -459,7 +430,7 @@ class StepWriter:
             "proposed = h * factor",
             "proposed = min(proposed, 0.5 * h) if astray else proposed",
             "proposed = min(proposed, fraction * h) if passed_over else proposed",
-            f"proposed = {AFTER_KINK!r} * proposed if good & cut else proposed",
+            f"proposed = {self._settings.step_after_kink!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
 
@@ -471,7 +442,7 @@ class StepWriter:
         lines = ["passed_over = False"]
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
-                far = f"(guess{k} <= earliest) & (near{k} > {WIDE!r} * narrow{k}__s)"
+                far = f"(guess{k} <= earliest) & (near{k} > {self._settings.narrow_peak_widths!r} * narrow{k}__s)"
                 within = f"(last{k} >= -narrow{k}__s) & (last{k} <= 0.0)"
                 lines.append(f"passed_over = passed_over | ({far} & (not ({within})))")
         return lines
@@ -491,14 +462,18 @@ class StepWriter:
         return lines if self.model.switches else lines + flips
 
     def _step_factor(self) -> list[str]:
-        """Write the factor on the step, SAFETY / error^(1/order), from the mean square error.
+        """Write the factor on the step, step_safety / error^(1/order), from the mean square error.
 
         It uses roots alone: the exponent 3/32 stands for 1/10.
         """
         lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
         if self.tableau.order == 4:
-            return [*lines, f"factor = {SAFETY!r} / root8"]
-        return [*lines, "root16 = sqrt(root8)", f"factor = {SAFETY!r} / (root16 * sqrt(root16))"]
+            return [*lines, f"factor = {self._settings.step_safety!r} / root8"]
+        return [
+            *lines,
+            "root16 = sqrt(root8)",
+            f"factor = {self._settings.step_safety!r} / (root16 * sqrt(root16))",
+        ]
 
     def _statistics(self) -> list[str]:
         """Write the largest force, and whether something happened that must be recorded."""
@@ -512,7 +487,7 @@ class StepWriter:
             f"happened = good & ({'' if self.model.clock else '(now >= next_sample) | '}(t_n >= stop))",
             f"within = {'False' if self.model.clock else INSIDE}",
             "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
-            f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._position}",
+            f"diverged = abs(deviation_n) * rtol > {self._settings.diverged_deviation!r} * tol{self._position}",
             "event = 2.0 if within else (1.0 if happened | failed else 0.0)",
             "event = 3.0 if diverged else event",
             "fraction = fraction if good else 0.0",
@@ -537,7 +512,8 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
+            f"least = {self._settings.least_turning_rate!r} * tol{self._velocity}",
+            "swing = max(abs(turning_s), abs(turning_n)) > least",
             # other turning points change no result
             "turned = turned & swing & ((now >= record_from) | (off <= outer))",
         ]

@@ -10,7 +10,7 @@ import numpy as np
 from friso.engine.arrays import Results
 from friso.engine.batch import Runs, part_of
 from friso.engine.kernel import empty_results
-from friso.engine.simulate import SAMPLES
+from friso.engine.simulate import usual_interval
 from friso.hunting.measures import Measures
 from friso.stage import Stage
 from friso.stage.rig import is_as_built
@@ -56,7 +56,7 @@ def built_runs(
         part = part_of(flat, numbers)
         part = with_complete_drive(part | {key: float(np.ravel(part[key])[0]) for key in TIMING if key in part})
         task = motion_task(part, len(numbers))
-        interval = max(1, round(task.duration / SAMPLES / part["drive.sample_time"])) * part["drive.sample_time"]
+        interval = max(1, round(usual_interval(task.duration) / part["drive.sample_time"])) * part["drive.sample_time"]
         for recorded in run_flat(part, stage.floor, task, [0] * len(numbers), interval, threads):
             if cancel is not None and cancel[0]:
                 return

@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.axis import axis_of
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.simulate import SAMPLES, checked_interval, time_axis
+from friso.engine.simulate import checked_interval, time_axis, usual_interval
 from friso.engine.tolerance import checked_rtol
 from friso.equations.as_built import AsBuilt
 from friso.errors import InputError
@@ -41,7 +41,7 @@ def response(stage: Stage, rtol: float | None = None, sample_time: float | None 
     flat = as_built_keys(stage)
     settings = RigSettings.current()
     drive, duration = flat["drive.sample_time"], flat["motion.duration"]
-    usual = max(1, round(duration / SAMPLES / drive)) * drive
+    usual = max(1, round(usual_interval(duration) / drive)) * drive
     interval = usual if sample_time is None else checked_interval(sample_time, duration)
     tight = nullcontext() if rtol is None else replace(settings, rig_rtol=checked_rtol(rtol)).in_use()
     if (share := interval / drive) < 1 - 1e-9 or abs(share - round(share)) > 1e-6:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Status
-from friso.engine.batch import CAPACITY
+from friso.engine.settings import RoomSettings
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble, done
@@ -96,7 +96,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
 
     Returns the runs at their new states and how they ended.
     """
-    settings = SurveySettings.current()
+    settings, room = SurveySettings.current(), RoomSettings.current().first_turning_points
     stages, count = runs.stages, runs.stages.count
     least = settings.least_swing * stages.length
     results = stages.run(
@@ -107,7 +107,7 @@ def one_round(runs: Pending, budget: float = np.inf) -> tuple[Pending, Ends]:
         window=0.5,
         record_from=np.inf,
         least_swing=least,
-        room=max(CAPACITY, min(settings.run_turning_points, settings.turning_point_room // count)),
+        room=max(room, min(settings.run_turning_points, settings.turning_point_room // count)),
         budget=int(min(budget, settings.round_step_limit)),
     )
     completed, away = done(results), np.equal(results.statuses, Status.DIVERGED)
