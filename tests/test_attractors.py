@@ -43,7 +43,7 @@ from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.attractors.survey import Survey, _slope
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW
-from friso.hunting.cycle.rest import bent
+from friso.hunting.cycle.rest import bent, spread_over
 from friso.hunting.margin import NOT_SOUGHT, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import run_motions
@@ -412,8 +412,9 @@ def test_thorough_starts_are_those_of_single_stages() -> None:
     begun = starts.Starts(stages)
     begun.spread(np.array([False, True, False]))
     few, many, same = np.bincount(np.concatenate(begun.owners)).tolist()
-    assert few == same == sum(map(len, starts.DISTANCES))
-    assert many == sum(map(len, starts.THOROUGH_DISTANCES)) + len(starts.PUSHES)
+    settings = SurveySettings()
+    assert few == same == len(spread_over(*settings.usual_starts))
+    assert many == len(spread_over(*settings.thorough_starts, settings.pushed_starts))
 
 
 UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
@@ -465,10 +466,9 @@ def test_what_back_calculation_does_at_38_and_at_40_hz(rtol: float) -> None:
 def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulations at a hundredth of the tolerance decide where no orbit was closed: here they are made to fail to see
     what the others do, by beginning at rest."""
-    monkeypatch.setattr(starts, "DISTANCES", (np.array([1e-6, 2e-6]),))
-    monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
     monkeypatch.setattr(starts.Starts, "seen", lambda *_: None)
-    attracted = attractors(held(CREEPING), thorough=True)
+    with SurveySettings(usual_starts=((1e-6, 2e-6, 2),), beside_motion_shares=(1e-6,)).in_use():
+        attracted = attractors(held(CREEPING), thorough=True)
     assert attracted.flips.tolist() == [True]
     assert attracted.decided.tolist() == [False]
     assert not attracted.motions

@@ -32,10 +32,9 @@ from friso.hunting.attractors import Attractors
 from friso.hunting.cycle.hunting import GIVEN_UP
 from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.settings import BasinSettings
+from friso.hunting.settings import BasinSettings, CheckSettings
 from friso.hunting.verdict import (
     BY_CHANCE,
-    CHANGED,
     LEFT_OVER,
     RUNS_AWAY,
     SWINGS_ON,
@@ -122,7 +121,7 @@ def judged(
     """The verdict on a stage that something attracts, where its own motion ends so, and is completed or not; and with
     the last of the other masses."""
     attraction = replace(fake_hunting(fake_cycle(), certain=certain), surveyed=surveyed(complete))
-    runs = np.array([(ends, completed)] * (len(CHANGED) - 1) + [other or (ends, completed)])
+    runs = np.array([(ends, completed)] * (len(CheckSettings().mass_changes) - 1) + [other or (ends, completed)])
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "ends_in": lambda *_: (*runs.T, np.full(len(runs), swing)),

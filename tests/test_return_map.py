@@ -18,15 +18,16 @@ from friso.hunting import SEARCH_LIMITS, Ensemble, find_margin, outward, stuck
 from friso.hunting.attractors import attractors
 from friso.hunting.basin import displacements_that_hunt
 from friso.hunting.cycle.hunting import hunting
+from friso.hunting.cycle.rest import spread_over
 from friso.hunting.margin import NOT_SOUGHT, _Grid, search_bandwidths
 from friso.hunting.return_map.attracting import MapSurvey, is_motion, survey_maps
 from friso.hunting.return_map.confirmed import runs_land_as_foretold
 from friso.hunting.return_map.landing_map import LandingMap, MapAttractor
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
-from friso.hunting.return_map.mapped import FAR_DISTANCES, NEAR_DISTANCES, gaps
+from friso.hunting.return_map.mapped import gaps
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.settings import EdgeSettings, ToleranceSettings
-from friso.hunting.what_attracts import SKETCH_DISTANCES, Sketch, has_a_map, resolved_map, sketched, what_attracts
+from friso.hunting.what_attracts import Sketch, has_a_map, resolved_map, sketched, what_attracts
 from friso.stage import Stage
 
 pytestmark = pytest.mark.inner
@@ -328,18 +329,19 @@ def test_an_orbit_of_many_swings_of_a_leaning_stage_is_known_again(survey: MapSu
 def test_the_page_says_what_certain_means_with_the_numbers_of_the_code() -> None:
     page = (Path(__file__).parent.parent / "docs" / "hunting.md").read_text(encoding="utf-8")
     edge, maps = EdgeSettings(), ReturnMapSettings()
+    sketched = len(spread_over(*maps.sketched_starts)) + len(spread_over(maps.far_starts)[1::3])
     section = " ".join(page.split("## What *certain* means")[1].split("\n## ")[0].split())
-    beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (edge.beyond_edge_factor, *outward.FARTHER[:-1]))
+    beyond = ", ".join(f"{100 * (factor - 1):.3g}" for factor in (edge.beyond_edge_factor, *edge.farther_factors[:-1]))
     steps = [f"{100 * (10 ** (1 / n) - 1):.0f}" for n in (SEARCH_LIMITS.steps_to_edge, SEARCH_LIMITS.steps_beyond)]
     tolerances = f"{RTOL:.0e} and at {ToleranceSettings().check_rtol_factor * RTOL:.0e}".replace("e-0", "e-")
     for text in (
         f"less than {100 * maps.map_scatter_share:g} %",
-        f"from {NEAR_DISTANCES[0]:g} to {FAR_DISTANCES[-1]:g} times",
+        f"from {maps.near_starts[0][0]:g} to {maps.far_starts[1]:g} times",
         f"at most {100 * edge.edge_bracket_share:g} % away",
-        f"{beyond} and {100 * (outward.FARTHER[-1] - 1):.3g} % beyond",
+        f"{beyond} and {100 * (edge.farther_factors[-1] - 1):.3g} % beyond",
         f"land up to {maps.confirmed_landings} times where the map says, at {tolerances}",
         f"from {SEARCH_LIMITS.lowest_bandwidth:g} to {SEARCH_LIMITS.highest_bandwidth:g} times",
         f"({steps[0]} and {steps[1]} %)",
-        f"from {len(SKETCH_DISTANCES) + len(FAR_DISTANCES[1::3])} distances",
+        f"from {sketched} distances",
     ):
         assert text in section

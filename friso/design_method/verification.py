@@ -13,8 +13,9 @@ import numpy as np
 from friso.design_method.population import Population, random_machines
 from friso.design_method.settings import DesignSettings
 from friso.design_method.spec import Spec
-from friso.engine.batch import CAPACITY, RunOptions, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
+from friso.engine.settings import RoomSettings
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
@@ -193,7 +194,7 @@ def _followed_moves(
         window=1 - settings.last_share,
         record_from=np.inf,
         least_swing=window / 4,
-        room=round(CAPACITY * time / settings.followed_time),
+        room=round(RoomSettings.current().first_turning_points * time / settings.followed_time),
         chunk=settings.runs_per_report,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))

@@ -25,16 +25,6 @@ from friso.hunting.cycle.shooting import close
 from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import has_a_map, what_attracts
 
-FARTHER = np.array([1.03, 1.06])
-"""Factors beyond the end of an orbit at which attractors are looked for again.
-
-Most windows to which no orbit leads lie there, and they are narrower than the steps of a search through all bandwidths.
-"""
-
-
-ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
-"""Start distances from which a motion is followed to the next bandwidth, as multiples of its sticking distance."""
-
 
 @dataclass(frozen=True)
 class AttractionEnd:
@@ -145,10 +135,10 @@ class EdgeSearch:
             if orbit is None:
                 return self._bracketed(place)
             end, last = self.followed(place.at, orbit)
-            distance = _orbit_distance(last, orbit)
+            distances = _followed_from([_orbit_distance(last, orbit)])
             place.at = end
             next_to, farther = self._just_beyond(end)
-            beyond, survey = self._proved(next_to, farther, ALONG * distance)
+            beyond, survey = self._proved(next_to, farther, distances)
             attracts = np.flatnonzero(survey.attracts)
             if not attracts.size:
                 if again := self._stable_again(end, next_to, last):
@@ -180,8 +170,8 @@ class EdgeSearch:
         The first result is the factor next to the end; the second, shape (n,), has factors farther off and may be
         empty. Raises Beyond if the first is beyond the end of the search.
         """
-        ahead = self._ahead(end)
-        next_to, farther = end * EdgeSettings.current().beyond_edge_factor ** ahead, end * FARTHER**ahead
+        settings, ahead = EdgeSettings.current(), self._ahead(end)
+        next_to, farther = end * settings.beyond_edge_factor**ahead, end * np.array(settings.farther_factors) ** ahead
         if self.settled is not None and ahead * (self.settled - end) > 0:
             next_to = _nearer(ahead, next_to, self.settled)
         if ahead * (next_to - self.farthest) > 0:
@@ -202,7 +192,7 @@ class EdgeSearch:
         place.outside = _nearer(ahead, place.outside, self.farthest)
         while True:
             factors = np.geomspace(place.at, place.outside, settings.bracket_steps + 2)[1:]
-            survey = self._told(factors, np.outer([motion.distance for motion in place.motions], ALONG).ravel())
+            survey = self._told(factors, _followed_from([motion.distance for motion in place.motions]))
             attracts = np.flatnonzero(survey.attracts)
             if attracts.size:
                 place.at, place.motions = float(factors[attracts[-1]]), survey.take(attracts[-1:]).motions
@@ -222,8 +212,8 @@ class EdgeSearch:
         """Tell whether the stage surely hunts at `place`, by a closed orbit or a thorough survey."""
         if any(motion.cycles is not None for motion in place.motions):
             return True
-        distances = np.outer([motion.distance for motion in place.motions], ALONG).reshape(1, -1)
-        survey = attractors(self._stages(np.array([place.at])), thorough=True, distances=distances)
+        distances = _followed_from([motion.distance for motion in place.motions])
+        survey = attractors(self._stages(np.array([place.at])), thorough=True, distances=distances[None])
         return bool(survey.attracts[0] and survey.decided[0])
 
     def _told(self, factors: np.ndarray, distances: np.ndarray, confirm: tuple[int, ...] = ()) -> Attractors:
@@ -322,6 +312,11 @@ class EdgeSearch:
 def _orbit_distance(point: Point, orbit: Swinging) -> float:
     """Return the distance [m] at which a stage sticks on an orbit, with the sign of its side."""
     return float(np.copysign(np.exp(point.distance), orbit.distance))
+
+
+def _followed_from(distances: list[float]) -> np.ndarray:
+    """Return start distances [m], shape (n,), from which motions are followed that stick at some distances [m]."""
+    return np.outer(distances, EdgeSettings.current().followed_starts).ravel()
 
 
 def _nearer(ahead: float, one: float, other: float) -> float:

@@ -17,15 +17,6 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import EdgeSettings
 from friso.hunting.what_attracts import surveyed_roughly, what_attracts
 
-SHARES = np.array([0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0])
-"""Values tried first on either side of the stage's own, as fractions of the logarithm of the farthest factor. They lie
-closest together near the stage's own value, and are as many as most processors run at once."""
-
-
-WITHIN = np.array([2, 4])
-"""Indices of the values, counted outward, that are searched thoroughly if a rough survey finds no change. They are 9
-and 23 % off for a farthest factor of three."""
-
 
 class Undecided(Exception):
     """Error: the search could not decide whether hunting begins or ends on a side."""
@@ -175,10 +166,11 @@ class _Side:
 
         Raises Undecided if surveys leave open whether hunting changes.
         """
-        yield from self._try(self.farthest**SHARES)
-        for _ in range(EdgeSettings.current().most_proofs):
+        settings = EdgeSettings.current()
+        yield from self._try(self.farthest ** np.array(settings.margin_steps))
+        for _ in range(settings.most_proofs):
             first = yield from self._bracketed()
-            pair = WITHIN if first is None else (yield from self._pair(first))
+            pair = np.array(settings.thorough_margin_steps) if first is None else (yield from self._pair(first))
             yield from self._search(pair[~self.searched[pair]])
             if first is None and not self.changed.any():
                 if not self.decided.all():

@@ -129,6 +129,16 @@ class EdgeSettings(Settings):
     beyond_edge_factor: float = setting(1.0095, "")
     """First factor beyond an edge at which no attractor may exist. It makes the edge accurate to one per cent."""
 
+    farther_factors: tuple[float, ...] = setting((1.03, 1.06), "")
+    """Factors beyond the end of an orbit at which attractors are looked for again. Most windows to which no orbit leads
+    lie there, and they are narrower than the steps of a search through all bandwidths."""
+
+    followed_starts: tuple[float, ...] = setting(
+        (0.92, 0.96, 0.98, 0.99, 0.995, 0.9975, 1.0, 1.0025, 1.005, 1.01, 1.02, 1.04, 1.08), "of the sticking distance"
+    )
+    """Starts from which a motion is followed to the next bandwidth. A motion moves by less than a tenth, and its basin
+    may be narrow."""
+
     past_end_steps: int = setting(4, "")
     """Steps in which an orbit is followed from its end to that factor, in case it is stable again there. In fewer steps
     Newton's method finds another orbit."""
@@ -150,6 +160,16 @@ class EdgeSettings(Settings):
 
     bandwidths_at_once: int = setting(8, "")
     """Bandwidths surveyed at once, as many as stages in one register."""
+
+    margin_steps: tuple[float, ...] = setting(
+        (0.04, 0.08, 0.13, 0.19, 0.28, 0.42, 0.65, 1.0), "of the log of the farthest factor"
+    )
+    """Values tried first on either side of the stage's own. They lie closest together near it, and are as many as most
+    processors run at once."""
+
+    thorough_margin_steps: tuple[int, int] = setting((2, 4), "steps")
+    """Values, counted outward, that are searched thoroughly if a rough survey finds no change: 9 and 23 % off for a
+    farthest factor of three."""
 
     proved_distances: tuple[float, float] = setting((0.02, 0.06), "log of factor")
     """Distances from the change at which thorough searches are made, on the hunting side and on the other. Nearer,
@@ -183,6 +203,9 @@ class CheckSettings(Settings):
 
     limit_force_share: float = setting(1e-9, "of the limit")
     """Largest difference between a force and its limit that is only rounding."""
+
+    mass_changes: tuple[float, ...] = setting((0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5), "of the mass")
+    """Changes of the masses with which a stage's own motion is run, because no mass is known that exactly."""
 
     free_work_share: float = setting(0.58, "")
     """Fraction of the work for the case with a free joint, whose limiter chatters."""

@@ -60,9 +60,6 @@ UNFOLLOWED = (
 )
 """Reason given when no attractor was found, but the motion was not continued until it rests."""
 
-CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
-"""Multiples of the stage's masses with which its motion is run, because no mass is known that exactly."""
-
 
 RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
 """Reason given when a motion swings much farther than the known attractor."""
@@ -316,8 +313,9 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """
     settings = CheckSettings.current()
     flat = stage.flat()
-    changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
-    ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
+    factors = 1 + np.array(settings.mass_changes)
+    changed = {key: value * factors for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
+    ends, completed, swing = ends_in({**flat, **changed}, len(factors), target)
     doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
     if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:

@@ -28,10 +28,6 @@ from friso.hunting.rows import ArrayRows
 from friso.hunting.settings import ToleranceSettings
 from friso.stage.standstill import dead_band
 
-SKETCH_DISTANCES = np.concatenate([[0.003], np.geomspace(0.02, 3.0, 14)])
-"""Distances at which stages stick at first for a sketch, in deflections of the loop by the break-away force."""
-
-
 SKETCH_RTOL = ToleranceSettings().sketch_rtol
 """Relative tolerance of the runs of a sketch."""
 
@@ -181,7 +177,7 @@ def _sketch(stages: Ensemble) -> tuple[Mapped | None, np.ndarray]:
     """
     if not has_a_map(stages):
         return None, np.zeros(stages.count, bool)
-    mapped = map_stages(stages, SKETCH_DISTANCES, 1, SKETCH_RTOL, sparse=True)
+    mapped = map_stages(stages, ReturnMapSettings.current().sketched_starts, 1, SKETCH_RTOL, sparse=True)
     return mapped, MapSurvey(mapped, (), (), np.zeros(stages.count, bool)).resolved
 
 

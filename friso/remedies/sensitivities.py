@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Results, Status
-from friso.engine.batch import MOST_TURNS
+from friso.engine.settings import RoomSettings
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import initial_displacement, rests, size, stands
 from friso.equations.structure import decisive_keys
@@ -259,7 +259,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     if not _is_smooth(flat, keys, until, float(entered[0]), settling, by, within):
         return None
     # a single run, with room for all turns
-    results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)
+    results = stages.run(start, duration, RTOL, least_swing=0.0, room=RoomSettings.current().most_turning_points)
     if not _all_done(results):
         return None
     turns = slice(int(results.turn_counts[0]))

@@ -21,9 +21,6 @@ from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
 from friso.hunting.loop import surely_run_away
 from friso.hunting.rows import ArrayRows
 
-BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
-"""Start distances of the second try, as multiples of the distance at which an observed motion sticks."""
-
 
 @dataclass(frozen=True)
 class Target(ArrayRows):
@@ -212,9 +209,10 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     starts = Starts(stages, TIGHT)
     starts.spread(thorough=False)
     observed = [motion for motion in first.motions if motion.stage not in proved]
+    shares = np.array(SurveySettings.current().beside_motion_shares)
     for motion in observed:
-        distances = np.full((stages.count, len(BESIDE)), np.nan)
-        distances[motion.stage] = BESIDE * motion.distance
+        distances = np.full((stages.count, len(shares)), np.nan)
+        distances[motion.stage] = shares * motion.distance
         starts.stuck_at(distances)
         if motion.seen is not None:
             starts.seen(motion.stage, motion.seen)

@@ -108,6 +108,33 @@ class SurveySettings(Settings):
     """Longest round, in the longest sticking time. A slower swing repeats within half of it; longer runs only cost
     time."""
 
+    thorough_starts: tuple[tuple[float, float, int], ...] = setting(
+        ((0.001, 0.009, 12), (0.01, 3.0, 96), (4.0, 300.0, 16)), "deflections at break-away"
+    )
+    """Distances at which a stage sticks at first: first, last and number of each range. From the nearest ones most runs
+    creep home; from the farthest ones they do not stick. Attractors are missed between two of them."""
+
+    usual_starts: tuple[tuple[float, float, int], ...] = setting(
+        ((0.001, 0.007, 4), (0.01, 3.0, 48), (5.0, 300.0, 6)), "deflections at break-away"
+    )
+    """Distances at which a stage sticks at first in surveys of many stages: half as many, which takes half as long."""
+
+    limited_starts: tuple[float, float, int] = setting((500.0, 30000.0, 8), "deflections at break-away")
+    """Farther starts with a force limit. A cycle driven by the limit is as large as the limit moves the masses while
+    the integrator unwinds."""
+
+    pushed_starts: tuple[float, float, int] = setting((0.03, 300.0, 12), "speeds that deflect the loop to break-away")
+    """Speeds of stages that start at their reference. They lead where starts at rest do not."""
+
+    remembering_starts: tuple[tuple[float, float, int], tuple[float, float, int]] = setting(
+        ((0.01, 10.0, 32), (0.01, 30.0, 128)), "deflections at break-away"
+    )
+    """Starts of stages with several bristles bent in many ways, for other surveys and for a thorough one. Each counts
+    seven times, once for each past."""
+
+    beside_motion_shares: tuple[float, ...] = setting((0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1), "of the distance")
+    """Starts beside an observed motion when it is observed again at a tighter tolerance. Its basin may be narrow."""
+
     wound_up_starts: tuple[tuple[float, float, int], tuple[float, ...]] = setting(
         ((0.1, 100.0, 24), (0.0, 1.0, 10.0)), ""
     )

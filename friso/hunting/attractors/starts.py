@@ -12,29 +12,8 @@ from friso.hunting.attractors.rounds import RTOL, Pending, loose_from, typical_p
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
-from friso.hunting.cycle.rest import bent, pushed, stuck
+from friso.hunting.cycle.rest import bent, pushed, spread_over, stuck
 from friso.stage.controllers import FORCE_LIMIT
-
-THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
-"""Distances at which a stage sticks at first, in deflections of the loop by the break-away force.
-
-From the nearest ones most runs creep home; from the farthest ones they do not stick."""
-
-DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
-"""Start distances for surveys of many stages: half as many as for a thorough survey."""
-
-LIMITED = np.geomspace(500.0, 30000.0, 8)
-"""Farther start distances for stages with a force limit, in deflections of the loop by the break-away force. A cycle
-driven by the limit is as large as the limit moves the masses while the integrator unwinds."""
-
-
-PUSHES = np.geomspace(0.03, 300.0, 12)
-"""Start velocities of stages at their reference, in units of the velocity that deflects the loop as far as break-away.
-"""
-
-REMEMBERED = np.geomspace(0.01, 30.0, 128), np.geomspace(0.01, 10.0, 32)
-"""Start distances of stages with several bristles bent in many ways: for a thorough survey, and for others. The unit is
-the deflection of the loop by the break-away force."""
 
 
 class Starts:
@@ -61,8 +40,8 @@ class Starts:
         controller = self.stages.structure.controller
         limited = controller is not None and controller.anti_windup is not None
         for side, more in product((1.0, -1.0), (False, True)):
-            spread = THOROUGH_DISTANCES if more else DISTANCES
-            units = np.concatenate([*spread, *([LIMITED] if limited else [])])
+            ranges = settings.thorough_starts if more else settings.usual_starts
+            units = spread_over(*ranges, *([settings.limited_starts] if limited else []))
             which = np.flatnonzero(np.equal(thorough, more) & ((side > 0) | ~self.stages.symmetric))
             if which.size:
                 owners = np.repeat(which, len(units))
@@ -74,9 +53,10 @@ class Starts:
                 if controller is not None and controller.anti_windup == "none":
                     self._wound_up(which, side)
                 if more:
-                    owners = np.repeat(which, len(PUSHES))
+                    pushes = spread_over(settings.pushed_starts)
+                    owners = np.repeat(which, len(pushes))
                     stages = self.stages.take(owners)
-                    speeds = np.tile(PUSHES, which.size) * stages.length * stages.number("rate")
+                    speeds = np.tile(pushes, which.size) * stages.length * stages.number("rate")
                     self._add(owners, pushed(stages, side * speeds))
 
     def _wound_up(self, which: np.ndarray, side: float) -> None:
@@ -86,7 +66,7 @@ class Starts:
         """
         settings = SurveySettings.current()
         span, times = settings.wound_up_starts
-        distances = np.geomspace(*span)
+        distances = spread_over(span)
         stages = self.stages.take(np.repeat(which, len(distances)))
         limit = stages.flat[FORCE_LIMIT] / stages.number("stiffness")
         begin = side * np.minimum(np.tile(distances, which.size) * limit, settings.farthest_start * stages.length)
@@ -103,7 +83,7 @@ class Starts:
         or back, or random travels to and fro. A `thorough` survey gets more distances.
         """
         settings = SurveySettings.current()
-        units = REMEMBERED[0 if thorough else 1]
+        units = spread_over(settings.remembering_starts[thorough])
         rng = np.random.default_rng(0)
         shares = np.exp(rng.uniform(np.log(settings.least_bend_back_share), 0.0, (2, len(units))))
         way = np.exp(

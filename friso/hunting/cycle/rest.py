@@ -59,3 +59,8 @@ def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore"):
         winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
         return np.minimum(winding, settings.leak_time_constants / np.asarray(2 * np.pi * integral_leak(stages.flat)))
+
+
+def spread_over(*ranges: tuple[float, float, int]) -> np.ndarray:
+    """Return numbers, shape (n,), that are spread evenly in their logarithm over ranges: first, last and number."""
+    return np.concatenate([np.geomspace(*one) for one in ranges])

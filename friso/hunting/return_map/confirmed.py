@@ -8,12 +8,8 @@ from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.return_map.attracting import MapSurvey
 from friso.hunting.return_map.landings import RTOL, find_landings
-from friso.hunting.return_map.mapped import NEAR_DISTANCES
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.hunting.settings import ToleranceSettings
-
-PLACES = np.array([1 / 6, 1 / 2, 5 / 6])
-"""Fractions of the list of starts, in order of distance, at which runs are checked."""
 
 
 def runs_land_as_foretold(survey: MapSurvey, numbers: np.ndarray) -> np.ndarray:
@@ -38,15 +34,16 @@ def _starts(survey: MapSurvey, stage: int) -> np.ndarray:
 
     They are in deflections of the loop by the break-away force.
     """
-    mapped = survey.mapped
+    settings, mapped = ReturnMapSettings.current(), survey.mapped
     runs = np.flatnonzero((mapped.owners == stage) & np.isfinite(mapped.starts))
     runs = runs[np.argsort(mapped.starts[runs], kind="stable")]
     starts, landings = mapped.starts[runs], mapped.landings
     last = landings.distances[runs, landings.count[runs]] / mapped.stages.length[stage]
     goes_on = ~landings.rest[runs] & mapped.maps[stage].goes_on(last)
     kinds = [which for which in map(np.flatnonzero, (goes_on, ~goes_on)) if which.size]
-    chosen = np.concatenate([which[(PLACES * len(which)).astype(int)] for which in kinds])
-    near = np.abs(starts) <= NEAR_DISTANCES[-1]
+    shares = np.array(settings.checked_start_shares)
+    chosen = np.concatenate([which[(shares * len(which)).astype(int)] for which in kinds])
+    near = np.abs(starts) <= settings.near_starts[-1][1]
     gaps = np.flatnonzero(near[:-1] & near[1:] & (starts[:-1] * starts[1:] > 0))
     widest = gaps[np.abs(np.log(starts[gaps + 1] / starts[gaps])).argmax()]
     between = np.sign(starts[widest]) * np.sqrt(starts[widest] * starts[widest + 1])

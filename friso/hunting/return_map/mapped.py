@@ -12,25 +12,11 @@ import numpy as np
 
 from friso.hunting.attractors.settings import SurveySettings
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import stuck
+from friso.hunting.cycle.rest import spread_over, stuck
 from friso.hunting.return_map.landing_map import LandingMap
 from friso.hunting.return_map.landings import RTOL, Landings, find_landings
 from friso.hunting.return_map.settings import ReturnMapSettings
 from friso.stage.controllers import FORCE_LIMIT
-
-NEAR_DISTANCES = np.concatenate([np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 24)])
-"""Start distances near the reference, in deflections of the loop by the break-away force."""
-
-FAR_DISTANCES = np.geomspace(5.0, 300.0, 6)
-"""Start distances, in deflections of the loop by the break-away force, from which a stage passes its reference without
-sticking at first."""
-
-LIMITED_DISTANCES = np.geomspace(600.0, 30000.0, 6)
-"""Start distances of stages with a force limit, in deflections of the loop by the break-away force."""
-
-
-WITHIN = np.array([0.2, 0.4, 0.6, 0.8])
-"""Fractions of the way between two starts at which more runs begin, to narrow down a break of the map."""
 
 
 @dataclass(frozen=True)
@@ -138,20 +124,20 @@ class Mapped:
 
 def map_stages(
     stages: Ensemble,
-    near: np.ndarray = NEAR_DISTANCES,
+    near: tuple[tuple[float, float, int], ...] | None = None,
     rounds: int | None = None,
     rtol: float = RTOL,
     sparse: bool = False,
 ) -> Mapped:
-    """Sample the return maps of stages by runs stuck `near` their reference, and farther off.
+    """Sample the return maps of stages by runs stuck near their reference, and farther off.
 
-    Distances are in deflections of the loop by the break-away force. Up to `rounds` times, runs are added where a map
+    `near` has ranges of distances (first, last, number), in deflections of the loop by the break-away force (None: as
+    the settings say). Up to `rounds` times, runs are added where a map
     is too coarse. A `sparse` map has every third of the farther starts only.
     """
     settings = ReturnMapSettings.current()
-    limited = [LIMITED_DISTANCES] if FORCE_LIMIT in stages.flat else []
-    far = np.concatenate([FAR_DISTANCES, *limited])
-    units = np.concatenate([near, far[1::3]] if sparse else [near, far])
+    far = spread_over(settings.far_starts, *([settings.limited_starts] if FORCE_LIMIT in stages.flat else []))
+    units = np.concatenate([spread_over(*(near or settings.near_starts)), far[1::3] if sparse else far])
     sides = [(np.arange(stages.count), 1.0), (np.flatnonzero(~stages.symmetric), -1.0)]
     owners = np.concatenate([np.repeat(which, len(units)) for which, _ in sides])
     starts = np.concatenate([np.tile(side * units, len(which)) for which, side in sides])
@@ -270,10 +256,11 @@ def _at_breaks(starts: np.ndarray, landings: np.ndarray) -> list[float]:
     breaks = (lands[:-1] != lands[1:]) | (
         lands[:-1] & lands[1:] & (np.abs(np.diff(np.log(sizes))) > settings.break_jump_log)
     )
-    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= NEAR_DISTANCES[-1]
+    near = np.maximum(np.abs(starts[:-1]), np.abs(starts[1:])) <= settings.near_starts[-1][1]
     apart = np.abs(np.diff(np.log(np.abs(starts)))) > settings.break_width_log
     ends = np.flatnonzero(breaks & near & apart & (starts[:-1] * starts[1:] > 0))
-    between = [starts[k] * (starts[k + 1] / starts[k]) ** WITHIN for k in ends]
+    shares = np.array(settings.break_shares)
+    between = [starts[k] * (starts[k + 1] / starts[k]) ** shares for k in ends]
     return np.concatenate(between).tolist() if between else []
 
 

@@ -14,6 +14,29 @@ class ReturnMapSettings(Settings):
     A landing is where a stage sticks after a swing.
     """
 
+    near_starts: tuple[tuple[float, float, int], ...] = setting(
+        ((0.001, 0.007, 4), (0.01, 3.0, 24)), "deflections at break-away"
+    )
+    """Starts near the reference: first, last and number of each range. More are added where the map needs them."""
+
+    far_starts: tuple[float, float, int] = setting((5.0, 300.0, 6), "deflections at break-away")
+    """Starts from which a stage passes its reference without sticking at first. The runs come to lie on the map
+    later."""
+
+    limited_starts: tuple[float, float, int] = setting((600.0, 30000.0, 6), "deflections at break-away")
+    """Farther starts with a force limit, which lets a stage swing as far as it moves the masses."""
+
+    sketched_starts: tuple[tuple[float, float, int], ...] = setting(
+        ((0.003, 0.003, 1), (0.02, 3.0, 14)), "deflections at break-away"
+    )
+    """Starts near the reference for a sketch. With fewer, hunting from a usual range of distances is missed."""
+
+    break_shares: tuple[float, ...] = setting((0.2, 0.4, 0.6, 0.8), "of the way between two starts")
+    """Places at which more runs begin, to narrow down a break of the map. More run at once for nothing."""
+
+    checked_start_shares: tuple[float, ...] = setting((1 / 6, 1 / 2, 5 / 6), "of the starts in order of distance")
+    """Starts from which runs check a map: near, middle and far."""
+
     hardly_attracting_share: float = setting(0.95, "")
     """Largest fraction of a deviation left per repetition at which a sketched attractor is trusted. Above it, 51 of 149
     sketched attractors did not attract."""
